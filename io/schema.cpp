@@ -1,0 +1,1 @@
+namespace hydrostat::io { extern const char* const kSchema; const char* const kSchema = "hydrostat"; }

@@ -1,0 +1,1 @@
+namespace hydrostat::physics { extern const char* const kMethods; const char* const kMethods = "explicit euler"; }

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace hydrostat::retarget {
+
+// The figures of one run, grouped and named as in report.json (README, "report.json"). "_length" is per L, "_size" per D.
+
+struct SourceReport {
+  std::string file, sha256, clip, root_motion;
+  double duration_s = 0, rate_hz = 0, scale = 1;
+};
+
+struct BodyReport {
+  int nodes = 0, elements = 0, constraints = 0, vertices = 0, pieces = 0, bridged_cells = 0, copied_cells = 0;
+  double mass_kg = 0, length_m = 0, size_m = 0, youngs_modulus_pa = 0;
+};
+
+struct CouplingReport {
+  double error_rms_length = 0, error_max_length = 0;
+};
+
+struct PreparationReport {
+  double smooth_shift_rms_length = 0, foot_shift_rms_length = 0, volume_shift_rms_length = 0, momentum_shift_rms_length = 0;
+  double total_shift_rms_length = 0;
+  double missing_wrench_rms_mg = 0, missing_wrench_max_mg = 0, flight_s = 0;
+  double min_jacobian = 0, volume_error_rms = 0;
+};
+
+struct InverseReport {
+  double miss_rms_length = 0, root_residual_mg = 0, kkt_residual = 0, saturated = 0, max_strain = 0, p95_strain = 0, limit = 0;
+};
+
+struct SignalsReport {
+  std::string kind;  // "loop" or "one_shot"
+  double period_s = 0, error_rms_l0 = 0;
+  int count = 0, harmonics = 0;
+};
+
+/// One free simulation.
+struct ReplayReport {
+  double cycles = 0, duration_s = 0;
+  bool fell = false;
+  double fall_time_s = 0;
+  std::string fall_cause;
+  double shape_rms_length = 0, clip_shape_rms_length = 0, world_rms_length = 0, drift_per_cycle_length = 0;
+  double heading_deg_per_cycle = 0, travel_per_cycle_length = 0, clip_travel_per_cycle_length = 0;
+  double slip_per_stance_length = 0, sole_gap_length = 0, penetration_max_size = 0, volume_error_max = 0;
+  double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
+  int inverted_elements = 0, guard_steps = 0;
+  double correction_rms = 0, real_time_factor = 0;
+  double apex_rise_length = 0, clip_apex_rise_length = 0;  // highest COM above the start, per L
+};
+
+struct EffectReport {
+  std::string name, state, reason;  // state: "on" or "off"
+  double ms_per_sim_s = 0;
+};
+
+struct AccuracyReport {
+  std::string method, element;
+  double dt_s = 0, estimated_error_length = 0;
+};
+
+struct RunReport {
+  SourceReport source;
+  BodyReport body;
+  CouplingReport coupling;
+  PreparationReport preparation;
+  InverseReport inverse;
+  SignalsReport signals;
+  std::optional<ReplayReport> naive, open_loop, closed_loop;
+  std::vector<EffectReport> effects;
+  AccuracyReport accuracy;
+  std::vector<std::pair<std::string, double>> timing_s;  // per stage, in order
+  std::vector<std::string> warnings;
+  bool outcome_ok = true;  // false: fell, diverged or short of what was asked (exit code 3)
+};
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,1 @@
+namespace hydrostat::signal { extern const char* const kKinds; const char* const kKinds = "loop one_shot"; }

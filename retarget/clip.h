@@ -8,10 +8,10 @@ namespace hydrostat::retarget {
 
 /// Bones in the order "parent before child".
 struct Skeleton {
-  std::vector<std::string> names;           // B
-  std::vector<int> parents;                 // B; -1 is a root
-  std::vector<Eigen::Affine3d> bind_pose;   // B; bone space to bind space [m], y up
-  std::vector<bool> weighted;               // B; moves skin
+  std::vector<std::string> names;          // B
+  std::vector<int> parents;                // B; -1 is a root
+  std::vector<Eigen::Affine3d> bind_pose;  // B; bone space to bind space [m], y up
+  std::vector<bool> weighted;              // B; moves skin
 
   int count() const { return static_cast<int>(names.size()); }
 };
@@ -22,19 +22,19 @@ struct SkinnedMesh {
     int bone;
     double weight;
   };
-  Eigen::Matrix3Xd vertices;                          // [m] 3 x V, bind pose
-  Eigen::Matrix3Xi triangles;                         // 3 x T
-  std::vector<std::vector<Influence>> skin_weights;   // V; each sums to 1
+  Eigen::Matrix3Xd vertices;                         // [m] 3 x V, bind pose
+  Eigen::Matrix3Xi triangles;                        // 3 x T
+  std::vector<std::vector<Influence>> skin_weights;  // V; each sums to 1
 };
 
 /// One clip, sampled at uniform times from its first key (frame 0) to its last key (frame F - 1).
 struct Clip {
   std::string name;
   int index = 0;
-  double duration_s = 0;    // from 0 to the last key, as the file counts
-  double range_s = 0;       // first to last key: what is played
-  double key_rate_hz = 0;   // of the file's densest channel
-  double rate_hz = 0;       // of the frames below: (F - 1) / range_s
+  double duration_s = 0;                                // from 0 to the last key, as the file counts
+  double range_s = 0;                                   // first to last key: what is played
+  double key_rate_hz = 0;                               // of the file's densest channel
+  double rate_hz = 0;                                   // of the frames below: (F - 1) / range_s
   std::vector<std::vector<Eigen::Affine3d>> bone_pose;  // F x B; bone space to world [m], y up
 
   int frames() const { return static_cast<int>(bone_pose.size()); }

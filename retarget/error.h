@@ -9,7 +9,10 @@ namespace hydrostat {
 /// "file: where: what is wrong. How to mend."
 struct Error : std::runtime_error {
   Error(std::string file_name, std::string place, const std::string& what_is_wrong, std::string how_to_mend)
-      : std::runtime_error(what_is_wrong), file(std::move(file_name)), where(std::move(place)), mend(std::move(how_to_mend)) {}
+      : std::runtime_error(what_is_wrong),
+        file(std::move(file_name)),
+        where(std::move(place)),
+        mend(std::move(how_to_mend)) {}
 
   std::string file;   // "walk.glb"
   std::string where;  // "bone 'LeftFoot'", "line 12", "option --nodes"

@@ -8,10 +8,10 @@ namespace hydrostat::retarget {
 /// A loop has one period and no repeated last frame; from one period to the next it moves on by `travel` and turns by `yaw`.
 struct Motion {
   double rate_hz = 60;
-  Eigen::MatrixXd frames;      // 3N x F
+  Eigen::MatrixXd frames;  // 3N x F
   bool loop = false;
   Eigen::Vector3d travel = Eigen::Vector3d::Zero();  // [m] a period, horizontal
-  double yaw = 0;              // [rad] a period, about y through the world's origin, before the travel is added
+  double yaw = 0;  // [rad] a period, about y through the world's origin, before the travel is added
 
   Eigen::Index count() const { return frames.cols(); }
   double period_s() const { return static_cast<double>(frames.cols()) / rate_hz; }

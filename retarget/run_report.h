@@ -31,7 +31,8 @@ struct PreparationReport {
 };
 
 struct InverseReport {
-  double miss_rms_length = 0, root_residual_mg = 0, kkt_residual = 0, saturated = 0, max_strain = 0, p95_strain = 0, limit = 0;
+  double miss_rms_length = 0, root_residual_mg = 0, kkt_residual = 0, saturated = 0, max_strain = 0, p95_strain = 0,
+         limit = 0;
 };
 
 struct SignalsReport {

@@ -1,0 +1,197 @@
+#include <algorithm>
+#include <cmath>
+
+#include "physics/elastic_forces.h"
+#include "physics/stepper.h"
+#include "physics/system_matrix.h"
+
+namespace hydrostat::physics {
+namespace {
+
+constexpr double kStepMargin = 0.8;    // of the linear stability bound at rest
+constexpr double kPushOutSpeed = 0.5;  // [m/s] at most, with which a point that starts below the ground is lifted
+constexpr int kContactSweeps = 30;
+constexpr double kContactTolerance = 1e-7;  // [m/s] change of a contact point's velocity in a sweep
+
+/// Largest eigenvalue [1/s2] of M^-1 K at rest, by power iteration.
+double largest_frequency_squared(const Body& body) {
+  SystemMatrix stiffness(body);
+  stiffness.set_zero();
+  stiffness.add_stiffness(body, body.rest, Eigen::VectorXd::Ones(body.edge_count()), 1);
+  Eigen::VectorXd root_mass(3 * body.node_count());
+  for (int i = 0; i < body.node_count(); ++i) root_mass.segment<3>(3 * i).setConstant(std::sqrt(body.mass[i]));
+  Eigen::VectorXd y(root_mass.size());
+  for (Eigen::Index i = 0; i < y.size(); ++i) y[i] = std::cos(1.7 * static_cast<double>(i * i % 97));
+  double eigenvalue = 0;
+  for (int k = 0; k < 100; ++k) {
+    y.normalize();
+    const Eigen::VectorXd z = y.cwiseQuotient(root_mass);
+    const Eigen::VectorXd product = (stiffness.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
+    eigenvalue = product.norm();
+    y = product;
+  }
+  return 1.05 * eigenvalue;
+}
+
+/// Symplectic Euler (velocity Verlet with velocities at half steps) with contact by impulses.
+///
+/// Internal forces are pairwise and taken at the positions from which the step starts, so linear and angular momentum
+/// change by the booked impulses alone, to rounding. Contact is solved on the velocity that moves the body: a point at gap g
+/// may approach with g / h at most; projected Gauss-Seidel over the points inside Coulomb's cone (Moreau's time stepping).
+class ExplicitStepper final : public Stepper {
+ public:
+  explicit ExplicitStepper(const Scene& scene)
+      : scene_(scene),
+        force_(3, scene.body.node_count()),
+        impulse_(Eigen::Matrix3Xd::Zero(3, scene.contact_points.count())),
+        inverse_mass_(scene.body.mass.cwiseInverse()),
+        point_inverse_mass_(scene.contact_points.count()) {
+    const double omega_squared = largest_frequency_squared(scene.body);
+    double damping_time = 0;
+    for (int e = 0; e < scene.body.edge_count(); ++e) {
+      damping_time = std::max(damping_time, scene.body.edge_damping[e] / scene.body.edge_stiffness[e]);
+    }
+    // 4 - 2 h c - h^2 w^2 > 0 with c = damping_time * w^2: the roots of the amplification polynomial stay in the unit disc.
+    const double c = damping_time * omega_squared;
+    stable_substep_ = kStepMargin * (std::sqrt(c * c + 4 * omega_squared) - c) / omega_squared;
+    const ContactPoints& points = scene.contact_points;
+    for (int p = 0; p < points.count(); ++p) {
+      point_inverse_mass_[p] = 0;
+      for (int k = 0; k < 4; ++k) {
+        point_inverse_mass_[p] += points.weights(k, p) * points.weights(k, p) * inverse_mass_[points.nodes(k, p)];
+      }
+    }
+    candidates_.reserve(static_cast<std::size_t>(points.count()));
+    active_.reserve(static_cast<std::size_t>(points.count()));
+    shortest_edge_ = scene.body.rest_length.minCoeff();
+  }
+
+  double substep(double dt) const override { return dt / std::ceil(dt / stable_substep_); }
+
+  Termination step(double dt, const Eigen::VectorXd& activation, const Eigen::Matrix3Xd* effect_force, State& state,
+                   Impulses& impulses) override {
+    const int substeps = static_cast<int>(std::ceil(dt / stable_substep_));
+    const double h = dt / substeps;
+    start_ = state;
+    impulses.contact.setZero();
+    impulses.contact_nodes.setZero();
+    impulses.contact_moment.setZero();
+    impulses.effect_nodes.setZero();
+    impulses.effect_moment.setZero();
+    impulses.gravity_moment.setZero();
+    if (scene_.has_ground) find_candidates(dt, state);
+    for (int s = 0; s < substeps; ++s) {
+      force_.setZero();
+      add_internal_forces(scene_.body, state, activation, force_);
+      if (effect_force != nullptr) {
+        force_ += *effect_force;
+        impulses.effect_nodes += h * *effect_force;
+        for (int i = 0; i < scene_.body.node_count(); ++i) {
+          impulses.effect_moment += h * state.x.col(i).cross(effect_force->col(i));
+        }
+      }
+      double fastest = 0;
+      for (int i = 0; i < scene_.body.node_count(); ++i) {
+        state.v.col(i) += h * (inverse_mass_[i] * force_.col(i) + scene_.gravity);
+        fastest = std::max(fastest, state.v.col(i).squaredNorm());
+      }
+      impulses.gravity_moment += h * (state.x * scene_.body.mass).cross(scene_.gravity);
+      if (!(std::sqrt(fastest) * h < shortest_edge_)) {
+        state = start_;
+        return Termination::kDiverged;
+      }
+      if (scene_.has_ground) push_apart(h, state, impulses);
+      state.x += h * state.v;
+    }
+    return Termination::kDone;
+  }
+
+ private:
+  double gap(const ConstPoints& x, int p) const {
+    return scene_.ground.normal.dot(scene_.contact_points.of(x, p)) - scene_.ground.offset;
+  }
+
+  /// The points that may touch the ground within dt.
+  void find_candidates(double dt, const State& state) {
+    candidates_.clear();
+    const double reach_of_gravity = scene_.gravity.norm() * dt * dt;
+    for (int p = 0; p < scene_.contact_points.count(); ++p) {
+      const double speed = scene_.contact_points.of(state.v, p).norm();
+      if (gap(state.x, p) < 3 * speed * dt + reach_of_gravity + 0.02 * shortest_edge_) {
+        candidates_.push_back(p);
+      } else {
+        impulse_.col(p).setZero();
+      }
+    }
+  }
+
+  void apply(int p, const Eigen::Vector3d& impulse, State& state) const {
+    const ContactPoints& points = scene_.contact_points;
+    for (int k = 0; k < 4; ++k) {
+      const int i = points.nodes(k, p);
+      state.v.col(i) += (points.weights(k, p) * inverse_mass_[i]) * impulse;
+    }
+  }
+
+  void push_apart(double h, State& state, Impulses& impulses) {
+    const ContactPoints& points = scene_.contact_points;
+    const Eigen::Vector3d normal = scene_.ground.normal;
+    active_.clear();
+    for (const int p : candidates_) {
+      const double distance = gap(state.x, p);
+      if (distance + h * normal.dot(points.of(state.v, p)) < 0 || impulse_.col(p).squaredNorm() > 0) {
+        active_.push_back({p, std::min(-distance / h, kPushOutSpeed)});
+        apply(p, impulse_.col(p), state);  // warm start
+      }
+    }
+    for (int sweep = 0; sweep < kContactSweeps; ++sweep) {
+      double change = 0;
+      for (const Active& contact : active_) {
+        const int p = contact.point;
+        const Eigen::Vector3d velocity = points.of(state.v, p);
+        Eigen::Vector3d wanted = impulse_.col(p);
+        const double normal_velocity = normal.dot(velocity);
+        const double normal_impulse =
+            std::max(0.0, normal.dot(wanted) + (contact.least_velocity - normal_velocity) / point_inverse_mass_[p]);
+        Eigen::Vector3d tangential =
+            wanted - normal.dot(wanted) * normal - (velocity - normal_velocity * normal) / point_inverse_mass_[p];
+        const double limit = scene_.ground.friction * normal_impulse, size = tangential.norm();
+        if (size > limit) tangential *= limit / size;
+        wanted = normal_impulse * normal + tangential;
+        const Eigen::Vector3d step = wanted - impulse_.col(p);
+        change = std::max(change, step.norm() * point_inverse_mass_[p]);
+        impulse_.col(p) = wanted;
+        apply(p, step, state);
+      }
+      if (change < kContactTolerance) break;
+    }
+    for (const Active& contact : active_) {
+      const int p = contact.point;
+      impulses.contact.col(p) += impulse_.col(p);
+      for (int k = 0; k < 4; ++k) {
+        impulses.contact_nodes.col(points.nodes(k, p)) += points.weights(k, p) * impulse_.col(p);
+      }
+      const Eigen::Vector3d place = points.of(state.x, p), impulse = impulse_.col(p);
+      impulses.contact_moment += place.cross(impulse);
+    }
+  }
+
+  struct Active {
+    int point;
+    double least_velocity;  // [m/s] along the normal
+  };
+
+  const Scene& scene_;
+  Eigen::Matrix3Xd force_, impulse_;  // [N], [N s] of the last substep
+  Eigen::VectorXd inverse_mass_, point_inverse_mass_;
+  State start_;
+  double stable_substep_ = 0, shortest_edge_ = 0;
+  std::vector<int> candidates_;
+  std::vector<Active> active_;
+};
+
+}  // namespace
+
+std::unique_ptr<Stepper> make_explicit_stepper(const Scene& scene) { return std::make_unique<ExplicitStepper>(scene); }
+
+}  // namespace hydrostat::physics

@@ -1,1 +1,0 @@
-namespace hydrostat::physics { extern const char* const kMethods; const char* const kMethods = "explicit euler"; }

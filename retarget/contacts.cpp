@@ -1,0 +1,133 @@
+#include "retarget/contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kGravity = 9.81;
+
+/// Runs of equal labels shorter than `least` take the label before them (round the seam of a loop too), shortest first.
+void close_short_runs(std::vector<ContactState>& states, int least, bool loop) {
+  const int count = static_cast<int>(states.size());
+  const auto at = [&](int f) -> ContactState& { return states[static_cast<std::size_t>(((f % count) + count) % count)]; };
+  for (int size = 1; size < least; ++size) {
+    for (int f = 0; f < count; ++f) {
+      if (!loop && f == 0) continue;
+      if (at(f) == at(f - 1)) continue;
+      int run = 1;
+      while (run < count && (loop || f + run < count) && at(f + run) == at(f)) ++run;
+      if (run != size || (!loop && f + run >= count)) continue;
+      const ContactState before = at(f - 1);
+      for (int k = 0; k < run; ++k) at(f + k) = before;
+    }
+  }
+}
+
+}  // namespace
+
+double ContactSchedule::flight_s(double rate_hz) const {
+  Eigen::Index flying = 0;
+  for (Eigen::Index f = 0; f < touching.cols(); ++f) flying += touching.col(f).any() ? 0 : 1;
+  return static_cast<double>(flying) / rate_hz;
+}
+
+double ground_height(const Motion& points) {
+  std::vector<double> lowest;
+  for (Eigen::Index f = 0; f < points.count(); ++f) lowest.push_back(points.at(f).row(1).minCoeff());
+  std::sort(lowest.begin(), lowest.end());
+  return lowest[lowest.size() / 5];
+}
+
+Motion point_motion(const physics::ContactPoints& points, const Motion& nodes) {
+  Motion result = nodes;
+  result.frames.resize(3 * points.count(), nodes.count());
+  for (Eigen::Index f = 0; f < nodes.count(); ++f) {
+    for (int p = 0; p < points.count(); ++p) result.frames.col(f).segment<3>(3 * p) = points.of(nodes.at(f), p);
+  }
+  return result;
+}
+
+ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bone_of_point,
+                               const std::vector<std::string>& bone_names, double length, double size,
+                               const ContactOptions& options) {
+  const Eigen::Index frames = points.count();
+  const Eigen::MatrixXd speed = velocities(points);
+  const double reach = options.height * size;
+  double squared = 0;
+  for (Eigen::Index f = 0; f < frames; ++f) {
+    for (Eigen::Index p = 0; p < speed.rows() / 3; ++p) squared += speed(3 * p, f) * speed(3 * p, f) + speed(3 * p + 2, f) * speed(3 * p + 2, f);
+  }
+  const double rms_speed = std::sqrt(squared / static_cast<double>(frames * speed.rows() / 3));
+  const double wave = std::sqrt(kGravity * length);
+  const double still = std::max(options.least_still_speed * wave, options.still_speed * rms_speed);
+  const double fall = options.fall_speed * wave;
+
+  std::map<int, std::vector<int>> points_of_bone;
+  for (std::size_t p = 0; p < bone_of_point.size(); ++p) points_of_bone[bone_of_point[p]].push_back(static_cast<int>(p));
+
+  ContactSchedule schedule;
+  schedule.touching = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(static_cast<Eigen::Index>(bone_of_point.size()), frames, false);
+  std::vector<Eigen::MatrixXd> directions;
+  for (const auto& [bone, members] : points_of_bone) {
+    std::vector<ContactState> states(static_cast<std::size_t>(frames), ContactState::kOff);
+    Eigen::MatrixXd direction = Eigen::MatrixXd::Zero(2, frames);
+    ContactState previous = ContactState::kOff;
+    for (int pass = 0; pass < (points.loop ? 2 : 1); ++pass) {  // twice round a loop, so that the seam has a history
+      for (Eigen::Index f = 0; f < frames; ++f) {
+        const auto x = points.at(f);
+        double lowest = 1e300;
+        for (const int p : members) lowest = std::min(lowest, x(1, p));
+        Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+        int low = 0;
+        for (const int p : members) {
+          if (x(1, p) > lowest + 0.3 * reach) continue;
+          velocity += speed.col(f).segment<3>(3 * p);
+          ++low;
+        }
+        velocity /= low;
+        const double ease = previous == ContactState::kOff ? 1 : options.hysteresis;
+        const double sideways = std::hypot(velocity.x(), velocity.z());
+        ContactState state = ContactState::kOff;
+        if (lowest < reach * ease && std::abs(velocity.y()) < fall * ease) {
+          state = sideways < still * (previous == ContactState::kStick ? options.hysteresis : 1) ? ContactState::kStick : ContactState::kSlide;
+        }
+        if (sideways > 0) direction.col(f) << velocity.x() / sideways, velocity.z() / sideways;
+        states[static_cast<std::size_t>(f)] = previous = state;
+      }
+    }
+    close_short_runs(states, options.least_frames, points.loop);
+    // A foot that brushes the ground on its way through is not dragged: sliding counts if it lasts.
+    for (int f = 0, count = static_cast<int>(frames); f < count; ++f) {
+      if (states[static_cast<std::size_t>(f)] != ContactState::kSlide) continue;
+      int begin = f, end = f;
+      const auto state_at = [&](int k) { return states[static_cast<std::size_t>(((k % count) + count) % count)]; };
+      while (f - begin < count && (points.loop || begin > 0) && state_at(begin - 1) == ContactState::kSlide) --begin;
+      while (end - f < count && (points.loop || end < count - 1) && state_at(end + 1) == ContactState::kSlide) ++end;
+      if (end - begin + 1 < 2 * options.least_frames + 1) states[static_cast<std::size_t>(f)] = ContactState::kOff;
+    }
+    if (std::all_of(states.begin(), states.end(), [](ContactState s) { return s == ContactState::kOff; })) continue;
+    for (Eigen::Index f = 0; f < frames; ++f) {
+      if (states[static_cast<std::size_t>(f)] != ContactState::kSlide) direction.col(f).setZero();
+      if (states[static_cast<std::size_t>(f)] == ContactState::kOff) continue;
+      const auto x = points.at(f);
+      double lowest = 1e300;
+      for (const int p : members) lowest = std::min(lowest, x(1, p));
+      for (const int p : members) schedule.touching(p, f) = x(1, p) < std::max(lowest, 0.0) + reach;
+    }
+    schedule.patches.push_back({bone_names[static_cast<std::size_t>(bone)], members});
+    schedule.state.push_back(states);
+    directions.push_back(direction);
+  }
+  schedule.sliding_x.resize(static_cast<Eigen::Index>(directions.size()), frames);
+  schedule.sliding_z = schedule.sliding_x;
+  for (std::size_t k = 0; k < directions.size(); ++k) {
+    schedule.sliding_x.row(static_cast<Eigen::Index>(k)) = directions[k].row(0);
+    schedule.sliding_z.row(static_cast<Eigen::Index>(k)) = directions[k].row(1);
+  }
+  return schedule;
+}
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "physics/contact.h"
+#include "retarget/motion.h"
+
+namespace hydrostat::retarget {
+
+/// What a patch of skin does on the ground: it holds, it is dragged while it bears weight, or it is away.
+enum class ContactState : char { kOff, kStick, kSlide };
+
+/// Contact points that touch and leave together: those of one bone.
+struct Patch {
+  std::string name;         // of the bone
+  std::vector<int> points;  // indices of contact points
+};
+
+struct ContactSchedule {
+  std::vector<Patch> patches;                         // only those that ever touch
+  std::vector<std::vector<ContactState>> state;       // patches x F
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> touching;  // contact points x F: bears load in that frame
+  Eigen::MatrixXd sliding_x, sliding_z;               // patches x F: direction of sliding, unit, 0 where it does not slide
+
+  double flight_s(double rate_hz) const;  // frames without any contact
+};
+
+struct ContactOptions {
+  double height = 0.03;        // per D: a patch touches below this
+  double hysteresis = 1.5;     // on height and speed, while it touches
+  double still_speed = 0.3;    // of the RMS speed of all points: slower sticks
+  double least_still_speed = 0.02;  // of sqrt(g L)
+  double fall_speed = 0.12;    // of sqrt(g L): a patch that rises or sinks faster does not touch
+  int least_frames = 3;        // shorter contacts and gaps are closed
+};
+
+/// Labels for the points' motion (height above the ground y = 0). `bone_of_point` names each point's patch.
+/// length [m] is L, size [m] is D.
+ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bone_of_point,
+                               const std::vector<std::string>& bone_names, double length, double size,
+                               const ContactOptions& options);
+
+/// Height [m] of the ground under a motion: the level on which its lowest points rest, the 20th percentile over the frames
+/// of the lowest point.
+double ground_height(const Motion& points);
+
+/// The motion of contact points carried by nodes.
+Motion point_motion(const physics::ContactPoints& points, const Motion& nodes);
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Sparse>
+#include <vector>
+
+namespace hydrostat::retarget {
+
+/// minimise 1/2 |J x - b|^2 subject to lower <= x <= upper, with J sparse.
+struct BoundedLeastSquares {
+  Eigen::SparseMatrix<double, Eigen::RowMajor> jacobian;
+  Eigen::VectorXd target;                 // b
+  Eigen::VectorXd lower, upper;           // may be -+ infinity
+  std::vector<int> row_blocks;            // first rows of the residual blocks, ending with the number of rows
+  std::vector<int> column_blocks;         // first columns of the parameter blocks, ending with the number of columns
+};
+
+struct BoundedSolution {
+  Eigen::VectorXd x;
+  double kkt_residual = 0;  // max violation of the optimality conditions [1], relative to the gradient at x = 0, bounds exact
+  int pivots = 0;
+  bool converged = false;   // the active set stands: every clamped entry pushes against its bound, every free one is inside
+};
+
+/// Ceres solves for the free entries while the clamped ones are held; block principal pivoting over them (Portugal,
+/// Judice, Vicente 1994) releases and clamps until the conditions of Karush, Kuhn and Tucker hold. A column block of more
+/// than one entry must be unbounded. `start` says which entries begin clamped: those that lie on a bound.
+BoundedSolution solve(const BoundedLeastSquares& problem, const Eigen::VectorXd& start, int max_pivots = 40);
+
+}  // namespace hydrostat::retarget

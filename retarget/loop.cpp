@@ -1,0 +1,48 @@
+#include "retarget/loop.h"
+
+#include <cmath>
+
+namespace hydrostat::retarget {
+
+Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tolerance, double* defect_out) {
+  const Eigen::Index last = frames.count() - 1;
+  if (last < 4) return frames;
+  const auto first_shape = frames.at(0), last_shape = frames.at(last);
+  const double total = mass.sum();
+  const Eigen::Vector3d first_com = first_shape * mass / total, last_com = last_shape * mass / total;
+  // The turn about y that fits best (the horizontal part of Kabsch's problem has a closed form).
+  double along = 0, across = 0;
+  for (Eigen::Index i = 0; i < mass.size(); ++i) {
+    const Eigen::Vector3d a = first_shape.col(i) - first_com, b = last_shape.col(i) - last_com;
+    along += mass[i] * (a.x() * b.x() + a.z() * b.z());
+    across += mass[i] * (a.z() * b.x() - a.x() * b.z());
+  }
+  double yaw = std::atan2(across, along);
+  if (std::abs(yaw) < 2e-3) yaw = 0;
+  Motion loop = frames;
+  loop.loop = true;
+  loop.yaw = yaw;
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  loop.travel = last_com - turn * first_com;
+  loop.travel.y() = 0;
+  Eigen::VectorXd defect(frames.frames.rows());
+  double squared = 0;
+  for (Eigen::Index i = 0; i < mass.size(); ++i) {
+    const Eigen::Vector3d miss = last_shape.col(i) - (turn * first_shape.col(i) + loop.travel);
+    defect.segment<3>(3 * i) = miss;
+    squared += mass[i] * miss.squaredNorm();
+  }
+  const double rms = std::sqrt(squared / total);
+  if (defect_out != nullptr) *defect_out = rms;
+  if (rms > tolerance) return frames;
+  // Half of the defect at either end, fading to nothing in the middle with flat slopes at the seam.
+  loop.frames.conservativeResize(Eigen::NoChange, last);
+  for (Eigen::Index f = 0; f < last; ++f) {
+    const double s = static_cast<double>(f) / static_cast<double>(last);
+    const double ramp = s < 0.5 ? 0.5 * std::pow(std::cos(M_PI * s), 2) : -0.5 * std::pow(std::cos(M_PI * s), 2);
+    loop.frames.col(f) += ramp * defect;
+  }
+  return loop;
+}
+
+}  // namespace hydrostat::retarget

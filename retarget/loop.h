@@ -1,0 +1,13 @@
+#pragma once
+
+#include "physics/body.h"
+#include "retarget/motion.h"
+
+namespace hydrostat::retarget {
+
+/// If the last frame repeats the first up to a horizontal travel and a turn about y, within `tolerance` [m] RMS, the loop:
+/// one period without the repeated frame, its closure defect spread by a smooth ramp. Otherwise the motion as it is.
+/// `mass` weighs the points, N.
+Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tolerance, double* defect = nullptr);
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "retarget/motion.h"
+
+namespace hydrostat::retarget {
+
+enum class RootMotion { kAuto, kKeep, kFromFeet, kNone };
+
+struct RootMotionResult {
+  Eigen::MatrixXd offset;  // [m] 3 x F, horizontal: added to every point of frame f
+  Eigen::Vector3d travel = Eigen::Vector3d::Zero();  // [m] added to a loop's travel a period
+  bool recovered = false;
+};
+
+/// The travel that an in-place clip has lost, from the backward sliding of what stands on the ground: the offset that makes
+/// the lowest points stand still. kAuto recovers where a loop travels less than 5 % of `length` [m] while its low points
+/// slide further than 10 % in a period; kFromFeet always, kKeep never, kNone takes the clip's own travel away.
+RootMotionResult recover_root_motion(const Motion& points, double length, RootMotion mode);
+
+}  // namespace hydrostat::retarget

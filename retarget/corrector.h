@@ -1,0 +1,45 @@
+#pragma once
+
+#include "physics/stepper.h"
+#include "physics/system_matrix.h"
+#include "retarget/muscles.h"
+
+namespace hydrostat::retarget {
+
+struct CorrectorOptions {
+  double horizon_s = 1.0 / 30;  // Th
+  double settle_s = 0.3;        // tau
+  double node_weight = 0.2;     // of the mass rows
+  double root_weight = 6;       // of the six rows of momentum
+  double effort = 0.8;          // eps, per squared muscle, with speeds per sqrt(g L)
+  double change = 1e-3;         // eps_d, per squared change of a muscle
+};
+
+/// Feedback on the muscles in deviation form: nothing on the nominal path.
+///
+/// dv_free = A^-1 [M ev + Th (f_int(x; a_ff) - f_int(x_ref; a_ff))], A = M + Th D + Th^2 (K + Kc on the points that touch now),
+/// min_w |W (dv_free + A^-1 Th B Phi w + ex / tau)|^2 + eps |w|^2 + eps_d |w - w_previous|^2. Source: the design, section 8.
+class Corrector {
+ public:
+  /// length [m] is L. Scene and muscles must outlive the corrector.
+  Corrector(const physics::Scene& scene, const Muscles& muscles, double length, double limit, const CorrectorOptions& options);
+
+  /// Adds the correction to `activation` (E, the feed-forward on entry), clamped to the limit. `touching` P says which points
+  /// bear load now. Returns the RMS of the muscles' correction.
+  double correct(const physics::State& state, const physics::State& reference, const std::vector<bool>& touching,
+                 Eigen::VectorXd& activation);
+  void reset() { previous_.setZero(); }
+  const Eigen::VectorXd& muscles_now() const { return previous_; }
+
+ private:
+  const physics::Scene& scene_;
+  const Muscles& muscles_;
+  CorrectorOptions options_;
+  double speed_unit_, limit_, contact_stiffness_;
+  physics::SystemMatrix matrix_;
+  Eigen::MatrixXd response_, weighted_, normal_;
+  Eigen::VectorXd free_, previous_;
+  Eigen::Matrix3Xd force_, reference_force_;
+};
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,255 @@
+#include "retarget/inverse_dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "physics/elastic_forces.h"
+#include "physics/system_matrix.h"
+#include "retarget/least_squares.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kTie = 1e4;             // weight of the rows that tie y to the residual force, over the rows of y
+constexpr double kForceWeight = 1e-3;    // per contact force in m g, in mm per m of L: makes the split of loads unique
+
+/// Everything about one frame that does not change from sweep to sweep.
+struct Frame {
+  BoundedLeastSquares problem;           // unknowns: y (3N, per mm per m of L), u (E), alpha (per m g)
+  std::vector<ContactGenerator> generators;
+  Eigen::VectorXd kinematic;             // u_kin, E
+  Eigen::VectorXd solution;
+  long shape_row = 0;                    // first of the E rows that hold u to its wish
+  double kkt_residual = 0;
+};
+
+struct Dynamics {
+  const physics::Scene& scene;
+  const PreparedTarget& prepared;
+  Eigen::MatrixXd velocity, acceleration;
+  double length, unit, weight;           // unit [m]: a thousandth of L
+};
+
+Eigen::VectorXd kinematic_activation(const physics::Body& body, const physics::ConstPoints& x, double limit) {
+  Eigen::VectorXd u(body.edge_count());
+  for (int e = 0; e < body.edge_count(); ++e) {
+    const double length = (x.col(body.edges(1, e)) - x.col(body.edges(0, e))).norm();
+    u[e] = std::clamp(length / body.rest_length[e] - 1, -limit, limit);
+  }
+  return u;
+}
+
+/// rho [N], 3 x N: what contact and activation must provide.
+Eigen::Matrix3Xd wanted_force(const Dynamics& dynamics, Eigen::Index f) {
+  const physics::Body& body = dynamics.scene.body;
+  const Eigen::Matrix3Xd x = dynamics.prepared.target.at(f);
+  const Eigen::Map<const Eigen::Matrix3Xd> v(dynamics.velocity.data() + f * dynamics.velocity.rows(), 3, x.cols());
+  const Eigen::Map<const Eigen::Matrix3Xd> a(dynamics.acceleration.data() + f * dynamics.acceleration.rows(), 3, x.cols());
+  Eigen::Matrix3Xd passive = Eigen::Matrix3Xd::Zero(3, x.cols());
+  physics::add_elastic_forces(body, x, Eigen::VectorXd::Ones(body.edge_count()), passive);
+  physics::add_damping_forces(body, x, v, passive);
+  Eigen::Matrix3Xd rho(3, x.cols());
+  for (int i = 0; i < body.node_count(); ++i) rho.col(i) = body.mass[i] * (a.col(i) - dynamics.scene.gravity) - passive.col(i);
+  return rho;
+}
+
+/// The force of a unit of u on the higher node of edge e; the lower one feels the opposite.
+Eigen::Vector3d edge_push(const physics::Body& body, const physics::ConstPoints& x, int e) {
+  return body.edge_stiffness[e] * body.rest_length[e] * (x.col(body.edges(1, e)) - x.col(body.edges(0, e))).normalized();
+}
+
+Eigen::SparseMatrix<double> compliance_matrix(const Dynamics& dynamics, const Eigen::Matrix3Xd& x, const Eigen::VectorXd& u, double ts,
+                                              physics::SystemMatrix& matrix) {
+  const physics::Body& body = dynamics.scene.body;
+  matrix.set_zero();
+  matrix.add_mass(body, 1);
+  matrix.add_damping(body, x, ts);
+  matrix.add_stiffness(body, x, Eigen::VectorXd(u.array() + 1), ts * ts);
+  return Eigen::SparseMatrix<double>(matrix.lower().selfadjointView<Eigen::Lower>());
+}
+
+Frame make_frame(const Dynamics& dynamics, Eigen::Index f, const InverseOptions& options) {
+  const physics::Body& body = dynamics.scene.body;
+  const physics::ContactPoints& points = dynamics.scene.contact_points;
+  const Eigen::Matrix3Xd x = dynamics.prepared.target.at(f);
+  const double ts = 1 / dynamics.prepared.target.rate_hz, mass = body.mass.sum();
+  const int nodes = body.node_count(), edges = body.edge_count();
+  Frame frame;
+  frame.generators = contact_generators(dynamics.prepared.contacts, f, dynamics.scene.ground.friction, options.support_friction);
+  frame.kinematic = kinematic_activation(body, x, options.limit);
+  physics::SystemMatrix matrix(body);
+  const Eigen::SparseMatrix<double> a = compliance_matrix(dynamics, x, frame.kinematic, ts, matrix);
+  const Eigen::Matrix3Xd rho = wanted_force(dynamics, f);
+
+  const int forces = static_cast<int>(frame.generators.size()), columns = 3 * nodes + edges + forces;
+  const int rows = 3 * nodes + 3 * nodes + edges + forces;
+  BoundedLeastSquares& problem = frame.problem;
+  std::vector<Eigen::Triplet<double>> entries;
+  problem.target = Eigen::VectorXd::Zero(rows);
+  // Rows of node i are scaled by row_scale: a displacement in units of a thousandth of L, mass-weighted.
+  Eigen::VectorXd row_scale(nodes);
+  for (int i = 0; i < nodes; ++i) row_scale[i] = kTie * std::sqrt(body.mass[i] / mass) / (body.mass[i] * dynamics.unit);
+  for (int c = 0; c < a.outerSize(); ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(a, c); it; ++it) {
+      entries.emplace_back(it.row(), c, row_scale[it.row() / 3] * it.value() * dynamics.unit);
+    }
+  }
+  const auto add_force = [&](int node, const Eigen::Vector3d& force, int column) {
+    for (int r = 0; r < 3; ++r) entries.emplace_back(3 * node + r, column, row_scale[node] * ts * ts * force[r]);
+  };
+  for (int e = 0; e < edges; ++e) {
+    const Eigen::Vector3d push = edge_push(body, x, e);
+    add_force(body.edges(1, e), push, 3 * nodes + e);
+    add_force(body.edges(0, e), -push, 3 * nodes + e);
+  }
+  for (int k = 0; k < forces; ++k) {
+    const ContactGenerator& g = frame.generators[static_cast<std::size_t>(k)];
+    for (int corner = 0; corner < 4; ++corner) {
+      add_force(points.nodes(corner, g.point), points.weights(corner, g.point) * dynamics.weight * g.force, 3 * nodes + edges + k);
+    }
+  }
+  for (int i = 0; i < nodes; ++i) problem.target.segment<3>(3 * i) = row_scale[i] * ts * ts * rho.col(i);
+  for (int i = 0; i < nodes; ++i) {
+    for (int r = 0; r < 3; ++r) entries.emplace_back(3 * nodes + 3 * i + r, 3 * i + r, std::sqrt(body.mass[i] / mass));
+  }
+  frame.shape_row = 6 * nodes;
+  for (int e = 0; e < edges; ++e) entries.emplace_back(frame.shape_row + e, 3 * nodes + e, 1.0);  // scaled per sweep
+  for (int k = 0; k < forces; ++k) entries.emplace_back(frame.shape_row + edges + k, 3 * nodes + edges + k, kForceWeight);
+  problem.jacobian.resize(rows, columns);
+  problem.jacobian.setFromTriplets(entries.begin(), entries.end());
+  problem.lower = Eigen::VectorXd::Constant(columns, -std::numeric_limits<double>::infinity());
+  problem.upper = Eigen::VectorXd::Constant(columns, std::numeric_limits<double>::infinity());
+  problem.lower.segment(3 * nodes, edges).setConstant(-options.limit);
+  problem.upper.segment(3 * nodes, edges).setConstant(options.limit);
+  problem.lower.tail(forces).setZero();
+  for (int i = 0; i <= nodes; ++i) problem.column_blocks.push_back(3 * i);
+  for (int c = 3 * nodes + 1; c <= columns; ++c) problem.column_blocks.push_back(c);
+  for (int r = 0; r <= 2 * nodes; ++r) problem.row_blocks.push_back(3 * r);
+  for (int r = 6 * nodes + 1; r <= rows; ++r) problem.row_blocks.push_back(r);
+  frame.solution = Eigen::VectorXd::Zero(columns);
+  frame.solution.segment(3 * nodes, edges) = frame.kinematic * 0.999;
+  frame.solution.tail(forces).setConstant(forces > 0 ? 1.0 / forces : 0);
+  return frame;
+}
+
+/// Solves one frame for the wish of its sweep.
+void solve_frame(Frame& frame, const Eigen::VectorXd& wish, double weight_per_edge) {
+  const long edges = wish.size();
+  const double scale = std::sqrt(weight_per_edge);
+  for (long e = 0; e < edges; ++e) {
+    const long row = frame.shape_row + e;
+    frame.problem.jacobian.valuePtr()[frame.problem.jacobian.outerIndexPtr()[row]] = scale;
+    frame.problem.target[row] = scale * wish[e];
+  }
+  const BoundedSolution solution = solve(frame.problem, frame.solution);
+  frame.solution = solution.x;
+  frame.kkt_residual = solution.kkt_residual;
+}
+
+}  // namespace
+
+double automatic_limit(const physics::Body& body, const Motion& target) {
+  std::vector<double> strains;
+  for (Eigen::Index f = 0; f < target.count(); ++f) {
+    const Eigen::VectorXd u = kinematic_activation(body, target.at(f), 10);
+    for (const double strain : u) strains.push_back(std::abs(strain));
+  }
+  const auto place = strains.begin() + static_cast<long>(0.99 * static_cast<double>(strains.size() - 1));
+  std::nth_element(strains.begin(), place, strains.end());
+  return std::clamp(*place, 0.1, 0.4);
+}
+
+InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const physics::Scene& scene, double length,
+                                       const InverseOptions& options) {
+  const physics::Body& body = scene.body;
+  const Motion& target = prepared.target;
+  const long frames = target.count(), edges = body.edge_count(), nodes = body.node_count();
+  const Dynamics dynamics{scene, prepared, velocities(target), accelerations(target), length, length * 1e-3, body.mass.sum() * scene.gravity.norm()};
+  std::vector<Frame> work(static_cast<std::size_t>(frames));
+  std::vector<Eigen::VectorXd> previous(static_cast<std::size_t>(frames));
+  // u of frame f for the smoothness term: loops go round, one-shots repeat their ends.
+  const auto u_of = [&](long f) -> const Eigen::VectorXd& {
+    f = target.loop ? (f + 2 * frames) % frames : std::clamp(f, 0L, frames - 1);
+    return previous[static_cast<std::size_t>(f)];
+  };
+  for (int sweep = 0; sweep < options.sweeps; ++sweep) {
+    const auto do_frame = [&](long f) {
+      Frame& frame = work[static_cast<std::size_t>(f)];
+      if (sweep == 0) {
+        frame = make_frame(dynamics, f, options);
+        solve_frame(frame, frame.kinematic, options.shape_weight / static_cast<double>(edges));
+        return;
+      }
+      // The terms with u_t of the three second differences around t, as one square, halfway to their minimum (Jacobi, damped).
+      const Eigen::VectorXd middle = (4 * (u_of(f - 1) + u_of(f + 1)) - u_of(f - 2) - u_of(f + 2)) / 6;
+      const Eigen::VectorXd damped = 0.5 * (middle + u_of(f));
+      const double smooth = 6 * options.smooth_weight;
+      const Eigen::VectorXd wish = (options.shape_weight * frame.kinematic + smooth * damped) / (options.shape_weight + smooth);
+      solve_frame(frame, wish, (options.shape_weight + smooth) / static_cast<double>(edges));
+    };
+    std::vector<std::thread> threads;
+    const long count = std::max(1, options.threads);
+    for (long k = 0; k < count; ++k) {
+      threads.emplace_back([&, k] {
+        for (long f = k; f < frames; f += count) do_frame(f);
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (long f = 0; f < frames; ++f) previous[static_cast<std::size_t>(f)] = work[static_cast<std::size_t>(f)].solution.segment(3 * nodes, edges);
+  }
+
+  InverseDynamics result;
+  result.activation.resize(edges, frames);
+  result.penalty_force.resize(edges, frames);
+  result.contact_force = Eigen::MatrixXd::Zero(3 * scene.contact_points.count(), frames);
+  result.miss.resize(frames);
+  physics::SystemMatrix matrix(body);
+  double root_squared = 0;
+  long saturated = 0;
+  std::vector<double> strains;
+  for (long f = 0; f < frames; ++f) {
+    const Frame& frame = work[static_cast<std::size_t>(f)];
+    const Eigen::Matrix3Xd x = target.at(f);
+    const Eigen::VectorXd u = frame.solution.segment(3 * nodes, edges);
+    Eigen::Matrix3Xd residual = wanted_force(dynamics, f);
+    for (int e = 0; e < edges; ++e) {
+      const Eigen::Vector3d push = u[e] * edge_push(body, x, e);
+      residual.col(body.edges(1, e)) -= push;
+      residual.col(body.edges(0, e)) += push;
+      const double now = (x.col(body.edges(1, e)) - x.col(body.edges(0, e))).norm();
+      result.penalty_force(e, f) = body.edge_stiffness[e] * (now - (1 + u[e]) * body.rest_length[e]);
+      saturated += std::abs(u[e]) > 0.999 * options.limit ? 1 : 0;
+      strains.push_back(std::abs(now / body.rest_length[e] - 1));
+    }
+    for (std::size_t k = 0; k < frame.generators.size(); ++k) {
+      const ContactGenerator& g = frame.generators[k];
+      const Eigen::Vector3d force = frame.solution[3 * nodes + edges + static_cast<long>(k)] * dynamics.weight * g.force;
+      result.contact_force.col(f).segment<3>(3 * g.point) += force;
+      for (int corner = 0; corner < 4; ++corner) {
+        residual.col(scene.contact_points.nodes(corner, g.point)) -= scene.contact_points.weights(corner, g.point) * force;
+      }
+    }
+    result.activation.col(f) = u.array() + 1;
+    root_squared += residual.rowwise().sum().squaredNorm() / (dynamics.weight * dynamics.weight) / static_cast<double>(frames);
+    const double ts = 1 / target.rate_hz;
+    compliance_matrix(dynamics, x, frame.kinematic, ts, matrix);
+    matrix.factor();
+    Eigen::MatrixXd miss = Eigen::Map<Eigen::VectorXd>(residual.data(), residual.size());
+    matrix.solve_in_place(miss);
+    const Eigen::Map<const Eigen::Matrix3Xd> y(miss.data(), 3, nodes);
+    result.miss[f] = ts * ts * std::sqrt((y.colwise().squaredNorm() * body.mass)(0) / body.mass.sum());
+    result.report.kkt_residual = std::max(result.report.kkt_residual, frame.kkt_residual);
+  }
+  result.report.miss_rms_length = std::sqrt(result.miss.squaredNorm() / static_cast<double>(frames)) / length;
+  result.report.root_residual_mg = std::sqrt(root_squared);
+  result.report.saturated = static_cast<double>(saturated) / static_cast<double>(frames * edges);
+  result.report.limit = options.limit;
+  std::sort(strains.begin(), strains.end());
+  result.report.max_strain = strains.back();
+  result.report.p95_strain = strains[static_cast<std::size_t>(0.95 * static_cast<double>(strains.size() - 1))];
+  return result;
+}
+
+}  // namespace hydrostat::retarget

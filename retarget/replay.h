@@ -1,0 +1,64 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "retarget/corrector.h"
+#include "retarget/prepare.h"
+#include "retarget/run_report.h"
+#include "retarget/trace.h"
+
+namespace hydrostat::retarget {
+
+/// A declared effect: a uniform force on all nodes that would change the body's velocity by delta_v within duration_s.
+struct Push {
+  double time_s = 0;
+  double duration_s = 0.1;
+  Eigen::Vector3d delta_v = Eigen::Vector3d::Zero();  // [m/s]
+};
+
+struct ReplayOptions {
+  double duration_s = 9;
+  double step_s = 1.0 / 240;    // outer step of the solver
+  int steps_per_control = 2;    // 120 Hz
+  physics::Method method = physics::Method::kExplicit;
+  bool correct = true;
+  CorrectorOptions corrector;
+  std::vector<Push> pushes;
+  bool trace = false;
+};
+
+/// What a replay is compared with and driven by. All refer to one body; everything must outlive the call.
+struct ReplayInput {
+  const physics::Scene& scene;            // the plant
+  const physics::Scene& model;            // what the corrector believes; the same but where seeds vary the plant
+  const PreparedTarget& prepared;
+  const Muscles& muscles;
+  std::function<void(double time_s, Eigen::VectorXd& activation)> feed_forward;  // E
+  Motion clip_skin;                       // the imported clip's skin points, 3V x F, on the ground and with its travel
+  physics::ContactPoints skin_points;     // the same points in the body
+  double length = 1, size = 1, limit = 0.3;
+};
+
+/// Time courses of one replay, one entry a control step.
+struct ReplayCourse {
+  Eigen::VectorXd time_s, height, heading_deg, correction, saturated, volume_ratio, slip_speed;
+  Eigen::MatrixXd com, target_com;        // 3 x S [m]
+  std::vector<std::vector<ContactState>> patch_state;  // patches x S, as simulated
+};
+
+struct Replay {
+  Motion motion;          // nodes, at the target's rate
+  ReplayReport report;
+  ReplayCourse course;
+  Trace trace;            // filled where asked
+  physics::Termination termination = physics::Termination::kDone;
+};
+
+/// Lets the body go: from the target's first state on nothing acts but its own activations, gravity, contact and the pushes.
+Replay replay(const ReplayInput& input, const ReplayOptions& options);
+
+/// min(15 cycles, 10 s) of a loop; a one-shot with a second more to stand on its feet.
+double usual_duration(const Motion& target);
+
+}  // namespace hydrostat::retarget

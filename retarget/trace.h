@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace hydrostat::retarget {
+
+/// A free simulation written down for an audit: column s of every time course is one row of the trace. Forces and moments are
+/// means over the row's interval, which ends at time_s[s]; row 0 is the start, forces zero. S rows, N nodes, E edges; column s
+/// of a 3N x S array holds x0 y0 z0 x1 y1 z1 ...
+struct Trace {
+  Eigen::VectorXd time_s;                // S
+  Eigen::VectorXd mass_kg;               // N
+  Eigen::MatrixXd position;              // [m] 3N x S
+  Eigen::MatrixXd velocity;              // [m/s] 3N x S
+  Eigen::MatrixXd contact_force;         // [N] 3N x S; self-contact is internal and not in it
+  Eigen::MatrixXd effect_force;          // [N] 3N x S; drag, buoyancy, pushes
+  Eigen::MatrixXd correction_impulse;    // [N s] 3N x S; any velocity correction that is no force of the scene
+  Eigen::Matrix3Xd contact_moment;       // [N m] 3 x S, about the world's origin
+  Eigen::Matrix3Xd effect_moment;        // [N m] 3 x S, about the world's origin
+  Eigen::MatrixXd activation;            // [-] E x S
+  Eigen::Matrix2Xi edges;                // 2 x E
+  Eigen::VectorXd rest_length_m;         // E
+  Eigen::Matrix4Xi elements;             // 4 x T
+
+  Eigen::Index count() const { return time_s.size(); }
+};
+
+}  // namespace hydrostat::retarget

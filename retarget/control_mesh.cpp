@@ -22,7 +22,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr int kNone = -1;
-constexpr double kSliver = 0.06;      // share of a cell below which a shallow part needs no cell of its own
+constexpr double kCrumb = 0.06;       // share of a cell below which a part is no part of its own
 constexpr double kLeastFill = 0.05;   // of a kept cell: a sheet still has mass
 
 template <typename Vector>
@@ -234,7 +234,7 @@ void find_parts(const LimbTable& different_limbs, Partition& body) {
     for_cellmates(v, [&](int w) {
       const int a = sets.root(v);
       const int b = sets.root(w);
-      if (a == b || std::min(at(fill, a), at(fill, b)) >= kSliver) return;
+      if (a == b || std::min(at(fill, a), at(fill, b)) >= kCrumb) return;
       const double sum = at(fill, a) + at(fill, b);
       sets.join(a, b);
       at(fill, sets.root(a)) = sum;
@@ -299,27 +299,26 @@ double cells_outside(const Partition& body, const Eigen::Vector3d& point, int ce
 }
 
 /// Drops the parts that are a thin layer on a fuller neighbour: skin that lies on the border of two cells, give or take a voxel.
-void drop_slivers(const std::vector<int>& vertex_parts, const SkinnedMesh& skin, Partition& body) {
-  constexpr double kThin = 0.03;  // cells
+void drop_slivers(const std::vector<int>& vertex_parts, const SkinnedMesh& skin, double least_fill, Partition& body) {
   std::vector<std::vector<int>> hosts(body.parts.size());
   for (const Link& link : body.links) {
-    if (at(body.parts, link.high).fill >= kSliver) at(hosts, link.low).push_back(link.high);
-    if (at(body.parts, link.low).fill >= kSliver) at(hosts, link.high).push_back(link.low);
+    if (at(body.parts, link.high).fill >= least_fill) at(hosts, link.low).push_back(link.high);
+    if (at(body.parts, link.low).fill >= least_fill) at(hosts, link.high).push_back(link.low);
   }
   auto lies_on_a_host = [&](int part, const Eigen::Vector3d& point, double reach) {
     return std::any_of(at(hosts, part).begin(), at(hosts, part).end(),
                        [&](int host) { return cells_outside(body, point, at(body.parts, host).cell) <= reach; });
   };
   std::vector<bool> is_sliver(body.parts.size());
-  for (std::size_t p = 0; p < is_sliver.size(); ++p) is_sliver[p] = body.parts[p].fill < kSliver && !hosts[p].empty();
+  for (std::size_t p = 0; p < is_sliver.size(); ++p) is_sliver[p] = body.parts[p].fill < least_fill && !hosts[p].empty();
   for (int v = 0; v < body.voxels.count(); ++v) {
     const int part = at(body.part_of, v);
-    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] && !lies_on_a_host(part, body.middle(v), 1.0 / body.lattice.fine))
+    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] && !lies_on_a_host(part, body.middle(v), least_fill + 0.5 / body.lattice.fine))
       is_sliver[static_cast<std::size_t>(part)] = false;
   }
   for (int v = 0; v < skin.vertices.cols(); ++v) {
     const int part = at(vertex_parts, v);
-    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] && !lies_on_a_host(part, skin.vertices.col(v), kThin))
+    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] && !lies_on_a_host(part, skin.vertices.col(v), least_fill))
       is_sliver[static_cast<std::size_t>(part)] = false;
   }
   for (std::size_t p = 0; p < is_sliver.size(); ++p) body.parts[p].kept = !is_sliver[p];
@@ -606,11 +605,12 @@ Partition partition_body(const Skeleton& skeleton, const SkinnedMesh& skin, cons
   return body;
 }
 
-ControlMesh mesh_in_lattice(const Skeleton& skeleton, const SkinnedMesh& skin, const TriangleSoup& closed, const Lattice& lattice) {
+ControlMesh mesh_in_lattice(const Skeleton& skeleton, const SkinnedMesh& skin, const TriangleSoup& closed, double least_fill,
+                            const Lattice& lattice) {
   Partition body = partition_body(skeleton, skin, closed, lattice);
   std::vector<int> vertex_parts;
   for (Eigen::Index v = 0; v < skin.vertices.cols(); ++v) vertex_parts.push_back(part_at(body, skin.vertices.col(v)));
-  drop_slivers(vertex_parts, skin, body);
+  drop_slivers(vertex_parts, skin, least_fill, body);
   ControlMesh mesh;
   mesh.bridged_cells = join_pieces(body);
   const Cells cells = number_cells(body);
@@ -632,7 +632,8 @@ double misfit(double nodes, double mean_fill, const Eigen::Vector3d& cell_size, 
 }
 
 /// Nodes and mean fill that a lattice would have, counted on the middles of voxels that another lattice marked: within a few per cent.
-std::pair<double, double> estimated_body(const std::vector<Eigen::Vector3d>& middles, double voxel_volume, const Lattice& lattice) {
+std::pair<double, double> estimated_body(const std::vector<Eigen::Vector3d>& middles, double voxel_volume, const Lattice& lattice,
+                                         double least_fill) {
   const Box cells{lattice.cells};
   const Box planes{lattice.cells.array() + 1};
   std::vector<double> fill(static_cast<std::size_t>(cells.count()), 0);
@@ -645,7 +646,7 @@ std::pair<double, double> estimated_body(const std::vector<Eigen::Vector3d>& mid
   double sum = 0;
   int kept = 0;
   for (int c = 0; c < cells.count(); ++c) {
-    if (at(fill, c) < kSliver) continue;
+    if (at(fill, c) < least_fill) continue;
     sum += std::min(1.0, at(fill, c));
     ++kept;
     for (int k = 0; k < 8; ++k) used[static_cast<std::size_t>(planes.index(cells.place(c) + corner_step(k)))] = true;
@@ -679,7 +680,7 @@ std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const Tria
       if (!tried.insert({cells[0], cells[1], cells[2]}).second) continue;
       const Lattice lattice = fitted_lattice(skin, cells, 1);
       if (lattice.cell_size.maxCoeff() > kLongestCell * lattice.cell_size.minCoeff() * (1 + 1e-9)) continue;
-      const auto [nodes, fill] = estimated_body(middles, rough.cell_size.prod(), lattice);
+      const auto [nodes, fill] = estimated_body(middles, rough.cell_size.prod(), lattice, options.least_fill);
       if (nodes > 0) ranked.push_back({misfit(nodes, fill, lattice.cell_size, options), {cells[0], cells[1], cells[2]}});
       if (nodes > 4 * wanted) along = wanted;  // finer lattices only have more
     }
@@ -703,6 +704,9 @@ void refuse_empty(const SkinnedMesh& skin) {
 
 std::string broken_rule(const BodyOptions& options) {
   if (options.nodes != 0 && (options.nodes < 20 || options.nodes > 5000)) return "nodes must be 0 (automatic) or from 20 to 5000";
+  if ((options.lattice.array() != 0).any() && (options.lattice.array() < 1).any()) return "lattice must have at least one cell along each axis";
+  if (options.lattice.cast<double>().prod() > 20000) return "lattice must have at most 20000 cells";
+  if (!(options.least_fill >= 0 && options.least_fill <= 0.5)) return "least_fill must be from 0 to 0.5";
   return "";
 }
 
@@ -710,12 +714,13 @@ ControlMesh build_control_mesh(const Skeleton& skeleton, const SkinnedMesh& skin
   refuse_empty(skin);
   constexpr int kFine = 10;
   const TriangleSoup closed = with_closed_holes(skin.vertices, skin.triangles);
-  const std::vector<Eigen::Vector3i> lattices = ranked_lattices(skin, closed, options);
+  const std::vector<Eigen::Vector3i> lattices =
+      options.lattice.isZero() ? ranked_lattices(skin, closed, options) : std::vector<Eigen::Vector3i>{options.lattice};
   const std::size_t tries = std::min<std::size_t>(3, lattices.size());
   ControlMesh best;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < tries; ++i) {
-    ControlMesh mesh = mesh_in_lattice(skeleton, skin, closed, fitted_lattice(skin, lattices[i], kFine));
+    ControlMesh mesh = mesh_in_lattice(skeleton, skin, closed, options.least_fill, fitted_lattice(skin, lattices[i], kFine));
     const double score = misfit(mesh.node_count(), mesh.tet_fill.mean(), mesh.cell_size, options);
     if (score >= least) continue;
     least = score;

@@ -8,7 +8,9 @@
 namespace hydrostat::retarget {
 
 struct BodyOptions {
-  int nodes = 0;  // wanted; 0 is automatic: what fits the body best around 200, within 100 to 600
+  int nodes = 0;             // wanted; 0 is automatic: what fits the body best around 200, within 100 to 600
+  Eigen::Vector3i lattice = Eigen::Vector3i::Zero();  // cells along x, y, z; 0 is chosen by the number of nodes
+  double least_fill = 0.06;  // a part that fills less of its cell, and reaches less far into it [cells], gets no cell: its skin is moved
 };
 
 /// Which value of the options breaks which rule, empty when all is well.

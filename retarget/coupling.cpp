@@ -1,0 +1,226 @@
+#include "retarget/coupling.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <thread>
+#include <vector>
+
+#include "retarget/error.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+/// A node and a bone that owns it.
+struct Hold {
+  int node;
+  int bone;
+  double weight;
+};
+
+struct Rig {
+  std::vector<Hold> holds;
+  Eigen::Matrix<double, 3, 4> directions;  // [m] from a node to its anchors, bind pose
+  double anchor_distance;                  // [m]
+};
+
+Rig hang_on_bones(const ControlMesh& mesh, const CouplingOptions& options) {
+  Rig rig;
+  rig.anchor_distance = options.anchor_distance * std::cbrt(mesh.cell_size.prod());
+  rig.directions << 1, 1, -1, -1,
+                    1, -1, 1, -1,
+                    1, -1, -1, 1;
+  rig.directions *= rig.anchor_distance / std::sqrt(3.0);
+  for (int n = 0; n < mesh.node_count(); ++n) {
+    const double least = std::min(options.least_weight, mesh.bone_weights.col(n).maxCoeff());
+    double held = 0;
+    const std::size_t first = rig.holds.size();
+    for (int b = 0; b < mesh.bone_weights.rows(); ++b) {
+      if (mesh.bone_weights(b, n) < least) continue;
+      rig.holds.push_back({n, b, mesh.bone_weights(b, n)});
+      held += mesh.bone_weights(b, n);
+    }
+    for (std::size_t h = first; h < rig.holds.size(); ++h) rig.holds[h].weight /= held;
+  }
+  return rig;
+}
+
+/// Four distance constraints of a node to anchors on one bone. Residual: sqrt(weight) (|x - p| - length) / anchor distance.
+class AnchorCost : public ceres::SizedCostFunction<4, 3> {
+ public:
+  Eigen::Matrix<double, 3, 4> anchors;  // [m] world
+  Eigen::Vector4d lengths;              // [m]
+  double strength = 1;                  // [1/m]
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Map<const Eigen::Vector3d> x(parameters[0]);
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector3d way = x - anchors.col(k);
+      const double distance = way.norm();
+      residuals[k] = strength * (distance - lengths[k]);
+      if (!jacobians || !jacobians[0]) continue;
+      Eigen::Vector3d::Map(jacobians[0] + 3 * k) = distance > 0 ? Eigen::Vector3d(strength / distance * way) : Eigen::Vector3d::Zero();
+    }
+    return true;
+  }
+};
+
+/// An edge of the mesh keeps its length. Residual: sqrt(elasticity) (|a - b| / length - 1).
+class EdgeCost : public ceres::SizedCostFunction<1, 3, 3> {
+ public:
+  double length = 1;    // [m]
+  double strength = 0;  // [-]
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Vector3d way = Eigen::Map<const Eigen::Vector3d>(parameters[0]) - Eigen::Map<const Eigen::Vector3d>(parameters[1]);
+    const double distance = way.norm();
+    residuals[0] = strength * (distance / length - 1);
+    if (!jacobians) return true;
+    const Eigen::Vector3d slope = distance > 0 ? Eigen::Vector3d(strength / (length * distance) * way) : Eigen::Vector3d::Zero();
+    if (jacobians[0]) Eigen::Vector3d::Map(jacobians[0]) = slope;
+    if (jacobians[1]) Eigen::Vector3d::Map(jacobians[1]) = -slope;
+    return true;
+  }
+};
+
+/// The problem of one frame, kept from frame to frame: only anchors, lengths and the first guess change.
+class FrameSolver {
+ public:
+  FrameSolver(const ControlMesh& mesh, const Rig& rig, const CouplingOptions& options)
+      : mesh_(mesh), rig_(rig), positions_(mesh.nodes), anchors_(rig.holds.size()), edges_(static_cast<std::size_t>(mesh.edges.cols())),
+        problem_(unowned()) {
+    for (std::size_t h = 0; h < anchors_.size(); ++h) {
+      anchors_[h].strength = std::sqrt(rig.holds[h].weight) / rig.anchor_distance;
+      problem_.AddResidualBlock(&anchors_[h], nullptr, positions_.col(rig.holds[h].node).data());
+    }
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      edges_[e].strength = std::sqrt(options.elasticity);
+      const Eigen::Vector2i ends = mesh.edges.col(static_cast<Eigen::Index>(e));
+      problem_.AddResidualBlock(&edges_[e], nullptr, positions_.col(ends[0]).data(), positions_.col(ends[1]).data());
+    }
+    solver_options_.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    solver_options_.num_threads = 1;
+    solver_options_.max_num_iterations = options.max_iterations;
+    solver_options_.function_tolerance = 1e-8;
+    solver_options_.parameter_tolerance = 1e-8;
+    solver_options_.gradient_tolerance = 1e-12;
+    solver_options_.logging_type = ceres::SILENT;
+  }
+
+  /// Node positions [m] for bones that moved by `motion` since the bind pose. False where the iterations did not suffice.
+  bool solve(const std::vector<Eigen::Affine3d>& motion) {
+    positions_.setZero();
+    for (std::size_t h = 0; h < anchors_.size(); ++h) {
+      const auto& [node, bone, weight] = rig_.holds[h];
+      const Eigen::Affine3d& move = motion[static_cast<std::size_t>(bone)];
+      const Eigen::Matrix<double, 3, 4> ways = move.linear() * rig_.directions;
+      const Eigen::Vector3d hub = move * mesh_.nodes.col(node);
+      anchors_[h].anchors = ways.colwise() + hub;
+      anchors_[h].lengths = ways.colwise().norm();
+      positions_.col(node) += weight * hub;
+    }
+    set_edge_lengths(motion);
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver_options_, &problem_, &summary);
+    return summary.termination_type == ceres::CONVERGENCE;
+  }
+
+  const Eigen::Matrix3Xd& positions() const { return positions_; }
+
+ private:
+  static ceres::Problem::Options unowned() {
+    ceres::Problem::Options options;
+    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
+  /// The length that an edge's bones give it, the mean over the owners of both ends.
+  void set_edge_lengths(const std::vector<Eigen::Affine3d>& motion) {
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      const int a = mesh_.edges(0, static_cast<Eigen::Index>(e));
+      const int b = mesh_.edges(1, static_cast<Eigen::Index>(e));
+      const Eigen::Vector3d way = mesh_.nodes.col(b) - mesh_.nodes.col(a);
+      double length = 0;
+      for (int bone = 0; bone < mesh_.bone_weights.rows(); ++bone) {
+        const double weight = 0.5 * (mesh_.bone_weights(bone, a) + mesh_.bone_weights(bone, b));
+        if (weight > 0) length += weight * (motion[static_cast<std::size_t>(bone)].linear() * way).norm();
+      }
+      edges_[e].length = length > 0 ? length : way.norm();
+    }
+  }
+
+  const ControlMesh& mesh_;
+  const Rig& rig_;
+  Eigen::Matrix3Xd positions_;
+  std::vector<AnchorCost> anchors_;
+  std::vector<EdgeCost> edges_;
+  ceres::Problem problem_;
+  ceres::Solver::Options solver_options_;
+};
+
+struct FrameError {
+  double squared_sum = 0;  // [m²]
+  double max = 0;          // [m]
+  bool converged = false;
+};
+
+}  // namespace
+
+std::string broken_rule(const CouplingOptions& options) {
+  if (!(options.anchor_distance > 0)) return "anchor_distance must be above 0";
+  if (!(options.elasticity >= 0)) return "elasticity must be 0 or above";
+  if (!(options.least_weight >= 0 && options.least_weight < 1)) return "least_weight must be from 0 to below 1";
+  if (options.max_iterations < 1) return "max_iterations must be 1 or more";
+  if (options.threads < 1) return "threads must be 1 or more";
+  return "";
+}
+
+CoupledMotion couple(const Character& character, const ControlMesh& mesh, const Embedding& skin_embedding, const CouplingOptions& options) {
+  const auto& [skeleton, skin, clip] = character;
+  if (clip.frames() == 0) throw Error("", "clip '" + clip.name + "'", "the clip has no frame", "Choose a clip that moves.");
+  CoupledMotion coupled;
+  coupled.motion.rate_hz = clip.rate_hz;
+  coupled.motion.frames.resize(3 * mesh.node_count(), clip.frames());
+
+  std::vector<Eigen::Affine3d> to_bone(static_cast<std::size_t>(skeleton.count()));
+  for (std::size_t b = 0; b < to_bone.size(); ++b) to_bone[b] = skeleton.bind_pose[b].inverse();
+  const Rig rig = hang_on_bones(mesh, options);
+  std::vector<FrameError> errors(static_cast<std::size_t>(clip.frames()));
+  auto solve_every = [&](int first, int step) {
+    FrameSolver solver(mesh, rig, options);
+    for (int f = first; f < clip.frames(); f += step) {
+      const std::vector<Eigen::Affine3d>& pose = clip.bone_pose[static_cast<std::size_t>(f)];
+      std::vector<Eigen::Affine3d> motion(to_bone.size());
+      for (std::size_t b = 0; b < motion.size(); ++b) motion[b] = pose[b] * to_bone[b];
+      FrameError& error = errors[static_cast<std::size_t>(f)];
+      error.converged = solver.solve(motion);
+      coupled.motion.at(f) = solver.positions();
+      const Eigen::VectorXd squared =
+          (embedded_positions(skin_embedding, solver.positions()) - skin_positions(skeleton, skin, pose)).colwise().squaredNorm();
+      error.squared_sum = squared.sum();
+      error.max = std::sqrt(squared.maxCoeff());
+    }
+  };
+  const int threads = std::min(options.threads, clip.frames());
+  std::vector<std::thread> crew;
+  for (int t = 1; t < threads; ++t) crew.emplace_back(solve_every, t, threads);
+  solve_every(0, threads);
+  for (std::thread& member : crew) member.join();
+
+  const double length = (skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff()).maxCoeff();
+  double squared_sum = 0;
+  for (int f = 0; f < clip.frames(); ++f) {
+    const FrameError& error = errors[static_cast<std::size_t>(f)];
+    squared_sum += error.squared_sum;
+    coupled.unconverged_frames += !error.converged;
+    if (error.max / length <= coupled.error_max_length) continue;
+    coupled.error_max_length = error.max / length;
+    coupled.worst_frame = f;
+  }
+  coupled.error_rms_length = std::sqrt(squared_sum / static_cast<double>(skin.vertices.cols() * clip.frames())) / length;
+  return coupled;
+}
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,111 @@
+#include "io/import.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "io/clip_range.h"
+#include "io/import_worker.h"
+#include "io/rig.h"
+#include "io/scene_pose.h"
+#include "retarget/error.h"
+
+namespace hydrostat::io {
+namespace {
+
+/// Of the 24 turns that take axes to axes the one nearest to a matrix.
+Eigen::Matrix3d nearest_axis_turn(const Eigen::Matrix3d& wanted) {
+  Eigen::Matrix3d nearest = Eigen::Matrix3d::Identity();
+  double best = nearest.cwiseProduct(wanted).sum();
+  std::array<int, 3> order{0, 1, 2};
+  do {
+    for (int signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+      for (int row = 0; row < 3; ++row) turn(row, order[static_cast<std::size_t>(row)]) = signs & (1 << row) ? -1 : 1;
+      const double fit = turn.cwiseProduct(wanted).sum();
+      // A hair above, so that the turn does not depend on rounding where two fit alike.
+      if (turn.determinant() < 0 || fit <= best + 1e-9 * wanted.norm()) continue;
+      best = fit;
+      nearest = turn;
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  return nearest;
+}
+
+/// The turn and scale that let the bind pose stand as the character stands in a pose: the weighted mean of the bones' turns,
+/// made square to the axes, and the median of their scales.
+Eigen::Affine3d stand_upright(const Rig& rig, const std::vector<Eigen::Affine3d>& pose) {
+  std::vector<double> weight(pose.size(), 0.0), scales;
+  for (const auto& influences : rig.skin.skin_weights) {
+    for (const auto& influence : influences) weight[static_cast<std::size_t>(influence.bone)] += influence.weight;
+  }
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (std::size_t b = 0; b < pose.size(); ++b) {
+    if (!rig.skeleton.weighted[b]) continue;
+    const Eigen::Matrix3d motion = (pose[b] * rig.skeleton.bind_pose[b].inverse()).linear();
+    mean += weight[b] * split_turn(motion).rotation;
+    scales.push_back(std::cbrt(std::abs(motion.determinant())));
+  }
+  std::nth_element(scales.begin(), scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2), scales.end());
+  const double scale = scales[scales.size() / 2];
+  // Shrunk to nothing at the first key: the bind pose's own size is the only one known.
+  return Eigen::Affine3d((scale > 1e-9 ? scale : 1.0) * nearest_axis_turn(mean));
+}
+
+/// Takes the bind pose's scale and shear out of bone space, in the bind pose and in every frame alike, so that skinning
+/// stays.
+void make_bone_space_rigid(retarget::Skeleton& skeleton, retarget::Clip& clip) {
+  for (std::size_t b = 0; b < skeleton.bind_pose.size(); ++b) {
+    Eigen::Affine3d& bind = skeleton.bind_pose[b];
+    const Turn turn = split_turn(bind.linear());
+    const Eigen::FullPivLU<Eigen::Matrix3d> stretch(turn.stretch);
+    const Eigen::Matrix3d undo = stretch.isInvertible() ? Eigen::Matrix3d(stretch.inverse()) : Eigen::Matrix3d::Identity();
+    bind.linear() = turn.rotation;
+    for (std::vector<Eigen::Affine3d>& frame : clip.bone_pose) frame[b].linear() = (frame[b].linear() * undo).eval();
+  }
+}
+
+retarget::Clip sample(const Rig& rig, const Scene& scene, std::size_t index, const ImportOptions& options) {
+  const SceneClip& source = scene.clips[index];
+  const ClipRange range = range_of(source);
+  retarget::Clip clip;
+  clip.name = source.name;
+  clip.index = static_cast<int>(index);
+  clip.range_s = range.length_s();
+  clip.duration_s = source.duration_s > 0 ? source.duration_s : range.end_s;
+  clip.key_rate_hz = range.key_rate_hz;
+  const int intervals = std::max(2, static_cast<int>(std::lround(options.sample_rate_hz * clip.range_s)));
+  clip.rate_hz = intervals / clip.range_s;
+  for (int f = 0; f <= intervals; ++f) {
+    clip.bone_pose.push_back(bone_poses(rig, scene, source, range.start_s + clip.range_s * f / intervals));
+  }
+  return clip;
+}
+
+}  // namespace
+
+retarget::Character import_character(const std::string& path, const std::string& clip, const ImportOptions& options,
+                                     std::vector<std::string>* warnings) {
+  const Scene scene = read_in_worker(path);
+  const std::size_t chosen = choose_clip(scene, clip, path);
+  Rig rig = build_rig(scene, path);
+  if (rig.skin.vertices.cols() == 0) {
+    throw Error(path, "meshes", "it has a skeleton and no skinned mesh",
+                "Export the character's mesh with its skin beside the skeleton");
+  }
+  retarget::Character character;
+  character.clip = sample(rig, scene, chosen, options);
+  const Eigen::Affine3d upright = stand_upright(rig, character.clip.bone_pose.front());
+  character.skeleton = std::move(rig.skeleton);
+  for (Eigen::Affine3d& bind : character.skeleton.bind_pose) bind = upright * bind;
+  character.skin = std::move(rig.skin);
+  character.skin.vertices = upright * character.skin.vertices;
+  make_bone_space_rigid(character.skeleton, character.clip);
+  if (warnings) {
+    warnings->insert(warnings->end(), scene.warnings.begin(), scene.warnings.end());
+    warnings->insert(warnings->end(), rig.warnings.begin(), rig.warnings.end());
+  }
+  return character;
+}
+
+}  // namespace hydrostat::io

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "retarget/clip.h"
+
+namespace hydrostat::io {
+
+struct ImportOptions {
+  double sample_rate_hz = 60;  // the clip gets max(2, round(rate * range)) equal intervals from first to last key
+};
+
+/// Reads a character and one of its clips in metres, y up, seconds.
+/// clip: a name (the part behind FBX's '|' will do), an index as text, or empty for the first clip of non-zero length.
+/// The bind pose is turned (by one of the 24 turns that take axes to axes) and scaled as a whole so that it stands as the
+/// character stands at the clip's first key; bone space is right-handed, orthonormal and in metres in the bind pose.
+/// Skinning is exact: sum(weight * bone_pose * inverse(bind_pose)) takes a vertex where the file has it. `warnings`, when
+/// given, receives what the importer had to decide. Throws Error: no file, not readable, no skeleton, no skinned mesh, no
+/// such clip (those that exist are listed), no clip of length.
+retarget::Character import_character(const std::string& path, const std::string& clip, const ImportOptions& options,
+                                     std::vector<std::string>* warnings = nullptr);
+
+struct BoneInfo {
+  std::string name, parent;  // no parent: a root
+  bool weighted = false;
+};
+
+struct MeshInfo {
+  std::string name;
+  int vertices = 0, triangles = 0;  // as the reader delivers them, not welded
+  bool skinned = false;
+};
+
+/// Box [m] of the skinned vertices (of the joints where there is no mesh), y up, at a fraction of the clip's duration.
+struct BoxInfo {
+  double fraction = 0;
+  Eigen::Vector3d min, max;
+};
+
+struct ClipInfo {
+  int index = 0;
+  std::string name;
+  double duration_s = 0, range_s = 0;  // from 0 to the last key; from the first to the last key
+  double rate_hz = 0;                  // of the densest channel
+  bool loop = false;  // the last key's pose is the first's, moved horizontally, to 2 % of L (RMS of the vertices)
+  bool in_place =
+      false;  // a loop that travels less than 5 % of L while its low points slide one way, by more than 10 % of L in all
+  double speed_m_s = 0;  // horizontal travel of the mean vertex over range_s
+  std::vector<BoxInfo> bbox;
+};
+
+/// What the importer sees in a file. L is the longest extent of the box at the clip's first key.
+struct FileInfo {
+  std::string file, format, up;
+  double metres_per_unit = 1;
+  std::vector<BoneInfo> bones;
+  std::vector<MeshInfo> meshes;
+  std::vector<ClipInfo> clips;
+  std::vector<std::string> warnings;
+};
+
+/// Throws Error: no file, not readable, no skeleton, no clip. A skeleton without any mesh is told by its joints.
+FileInfo inspect(const std::string& path);
+
+/// Schema hydrostat.info/1.
+std::string to_json(const FileInfo& info);
+
+}  // namespace hydrostat::io

@@ -1,0 +1,338 @@
+#include <tiny_gltf.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <set>
+
+#include "io/read_scene.h"
+#include "io/track.h"
+#include "retarget/error.h"
+
+namespace hydrostat::io {
+namespace {
+
+constexpr const char* kExportAnew = "Export the file anew";
+
+bool ignore_image(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
+  return true;
+}
+
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+tinygltf::Model load(const std::string& path) {
+  tinygltf::TinyGLTF loader;
+  loader.SetImageLoader(ignore_image, nullptr);
+  tinygltf::Model model;
+  std::string failure, warning;
+  std::string extension = std::filesystem::path(path).extension().string();
+  const bool binary = extension.size() == 4;  // .glb, in whichever case
+  const bool read = binary ? loader.LoadBinaryFromFile(&model, &failure, &warning, path)
+                           : loader.LoadASCIIFromFile(&model, &failure, &warning, path);
+  if (!read) throw Error(path, "import", "it is no whole glTF 2.0 file (" + first_line(failure) + ")", kExportAnew);
+  for (const std::string& extension_name : model.extensionsRequired) {
+    if (extension_name == "KHR_draco_mesh_compression" || extension_name == "EXT_meshopt_compression") {
+      throw Error(path, "extension " + extension_name, "its data is compressed in a way that is not read",
+                  "Export it uncompressed");
+    }
+  }
+  return model;
+}
+
+/// One number of an accessor's component type; a normalised integer as the fraction it means.
+/// Source: glTF 2.0, section 3.6.2.2 and "Animations" (f = max(c / 127, -1) and so on).
+double decode(const unsigned char* at, int component_type, bool normalised) {
+  const auto fraction = [&]<typename Integer>(Integer value) {
+    std::memcpy(&value, at, sizeof(Integer));
+    const auto number = static_cast<double>(value);
+    return normalised ? std::max(number / static_cast<double>(std::numeric_limits<Integer>::max()), -1.0) : number;
+  };
+  switch (component_type) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return fraction(std::int8_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return fraction(std::uint8_t{});
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return fraction(std::int16_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return fraction(std::uint16_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return fraction(std::uint32_t{});
+    default:
+      break;
+  }
+  float value = 0;
+  std::memcpy(&value, at, sizeof value);
+  return value;
+}
+
+/// Reads one file; its parts become ours one after the other.
+class GltfReader {
+ public:
+  explicit GltfReader(const std::string& path) : path_(path), model_(load(path)) {}
+
+  Scene read() {
+    scene_.format = "gltf";
+    read_nodes();
+    read_meshes();
+    for (std::size_t a = 0; a < model_.animations.size(); ++a) read_clip(model_.animations[a], a);
+    return std::move(scene_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& where, const std::string& what, const std::string& mend = kExportAnew) const {
+    throw Error(path_, where, what, mend);
+  }
+
+  template <typename Item>
+  const Item& at(const std::vector<Item>& items, int index, const std::string& where) const {
+    if (index < 0 || static_cast<std::size_t>(index) >= items.size())
+      refuse(where, "it points to something that is not in the file");
+    return items[static_cast<std::size_t>(index)];
+  }
+
+  /// An accessor's numbers, one element a column. `normalise_integers` for data that may only be normalised (weights,
+  /// rotations).
+  Eigen::MatrixXd numbers(int index, Eigen::Index components, const std::string& where,
+                          bool normalise_integers = false) const {
+    const tinygltf::Accessor& accessor = at(model_.accessors, index, where);
+    const int width = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor.componentType));
+    if (tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type)) != components || width <= 0 ||
+        width > 4) {
+      refuse(where, "its data has the wrong type");
+    }
+    if (accessor.sparse.isSparse)
+      refuse(where, "its data is stored sparsely, which is not read", "Export it without sparse accessors");
+    const tinygltf::BufferView& view = at(model_.bufferViews, accessor.bufferView, where);
+    const tinygltf::Buffer& buffer = at(model_.buffers, view.buffer, where);
+    const int stride = accessor.ByteStride(view);
+    const auto element = static_cast<std::size_t>(width) * static_cast<std::size_t>(components);
+    if (accessor.count == 0 || stride <= 0) refuse(where, "its data is empty or misplaced");
+    const std::size_t limit = std::min(buffer.data.size(), view.byteOffset + view.byteLength);
+    const std::size_t start = view.byteOffset + accessor.byteOffset;
+    if (accessor.count > limit || start + (accessor.count - 1) * static_cast<std::size_t>(stride) + element > limit) {
+      refuse(where, "its data runs past the end of the file's buffer");
+    }
+    const bool normalised = accessor.normalized || normalise_integers;
+    Eigen::MatrixXd values(components, static_cast<Eigen::Index>(accessor.count));
+    for (Eigen::Index e = 0; e < values.cols(); ++e) {
+      const unsigned char* from =
+          buffer.data.data() + start + static_cast<std::size_t>(e) * static_cast<std::size_t>(stride);
+      for (Eigen::Index c = 0; c < components; ++c)
+        values(c, e) = decode(from + c * width, accessor.componentType, normalised);
+    }
+    return values;
+  }
+
+  static Eigen::Affine3d local_transform(const tinygltf::Node& node) {
+    Eigen::Affine3d local = Eigen::Affine3d::Identity();
+    if (node.matrix.size() == 16) {
+      local.matrix() = Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
+      local.makeAffine();
+      return local;
+    }
+    if (node.translation.size() == 3) local.translate(Eigen::Vector3d(node.translation.data()));
+    if (node.rotation.size() == 4) local.rotate(Eigen::Quaterniond(node.rotation.data()).normalized());
+    if (node.scale.size() == 3) local.scale(Eigen::Vector3d(node.scale.data()));
+    return local;
+  }
+
+  void read_nodes() {
+    std::vector<bool> is_child(model_.nodes.size(), false);
+    for (const tinygltf::Node& node : model_.nodes) {
+      for (const int child : node.children) {
+        at(model_.nodes, child, "nodes");
+        if (is_child[static_cast<std::size_t>(child)]) refuse("node " + std::to_string(child), "it hangs below two nodes");
+        is_child[static_cast<std::size_t>(child)] = true;
+      }
+    }
+    scene_node_.assign(model_.nodes.size(), -1);
+    for (std::size_t n = 0; n < model_.nodes.size(); ++n) {
+      if (!is_child[n]) add_node(static_cast<int>(n), -1);
+    }
+    // Whatever no root leads to hangs in a ring.
+    if (scene_.nodes.size() != model_.nodes.size()) refuse("nodes", "some nodes are their own ancestors");
+    for (const tinygltf::Skin& skin : model_.skins) {
+      for (const int joint : skin.joints) scene_.nodes[place(joint, "skin '" + skin.name + "'")].is_joint = true;
+    }
+  }
+
+  void add_node(int index, int parent) {
+    const tinygltf::Node& node = model_.nodes[static_cast<std::size_t>(index)];
+    SceneNode ours;
+    ours.name = node.name.empty() ? "node_" + std::to_string(index) : node.name;
+    ours.parent = parent;
+    ours.parts = {local_transform(node)};
+    ours.holds_mesh = node.mesh >= 0;
+    if (!ours.parts.front().matrix().allFinite()) refuse("node '" + ours.name + "'", "its transform is not finite");
+    const int place = static_cast<int>(scene_.nodes.size());
+    scene_node_[static_cast<std::size_t>(index)] = place;
+    scene_.nodes.push_back(std::move(ours));
+    for (const int child : node.children) add_node(child, place);
+  }
+
+  /// The scene node that a node of the file became.
+  std::size_t place(int index, const std::string& where) const {
+    return static_cast<std::size_t>(at(scene_node_, index, where));
+  }
+
+  void read_meshes() {
+    for (std::size_t n = 0; n < model_.nodes.size(); ++n) {
+      const tinygltf::Node& node = model_.nodes[n];
+      if (node.mesh < 0) continue;
+      const tinygltf::Mesh& mesh = at(model_.meshes, node.mesh, "node '" + node.name + "'");
+      for (const tinygltf::Primitive& primitive : mesh.primitives) read_primitive(primitive, mesh, node, scene_node_[n]);
+    }
+  }
+
+  void read_primitive(const tinygltf::Primitive& primitive, const tinygltf::Mesh& mesh, const tinygltf::Node& node,
+                      int scene_node) {
+    SceneMesh ours;
+    ours.name = mesh.name.empty() ? "mesh_" + std::to_string(node.mesh) : mesh.name;
+    ours.node = scene_node;
+    const std::string where = "mesh '" + ours.name + "'";
+    const auto positions = primitive.attributes.find("POSITION");
+    if (positions == primitive.attributes.end()) return;
+    ours.vertices = numbers(positions->second, 3, where);
+    if (!ours.vertices.allFinite()) refuse(where, "a vertex is not finite");
+    ours.triangles = triangles(primitive, ours.vertices.cols(), where);
+    if (ours.triangles.cols() == 0) return;  // points or lines
+    if (node.skin >= 0) ours.joints = joints(primitive, at(model_.skins, node.skin, where), ours.vertices.cols(), where);
+    scene_.meshes.push_back(std::move(ours));
+  }
+
+  Eigen::Matrix3Xi triangles(const tinygltf::Primitive& primitive, Eigen::Index vertices, const std::string& where) const {
+    std::vector<int> corners;
+    if (primitive.indices >= 0) {
+      const Eigen::MatrixXd indices = numbers(primitive.indices, 1, where);
+      if (indices.minCoeff() < 0 || indices.maxCoeff() >= static_cast<double>(vertices)) {
+        refuse(where, "a triangle names a vertex that is not there");
+      }
+      for (Eigen::Index i = 0; i < indices.size(); ++i) corners.push_back(static_cast<int>(indices(i)));
+    } else {
+      for (int i = 0; i < vertices; ++i) corners.push_back(i);
+    }
+    std::vector<Eigen::Vector3i> found;
+    const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+    const std::size_t step = mode == TINYGLTF_MODE_TRIANGLES ? 3 : 1;
+    for (std::size_t i = 0; i + 2 < corners.size(); i += step) {
+      const bool odd = mode == TINYGLTF_MODE_TRIANGLE_STRIP && i % 2 == 1;
+      const int first = mode == TINYGLTF_MODE_TRIANGLE_FAN ? corners[0] : corners[i];
+      if (mode >= TINYGLTF_MODE_TRIANGLES) found.emplace_back(first, corners[i + (odd ? 2 : 1)], corners[i + (odd ? 1 : 2)]);
+    }
+    Eigen::Matrix3Xi ours(3, static_cast<Eigen::Index>(found.size()));
+    for (std::size_t t = 0; t < found.size(); ++t) ours.col(static_cast<Eigen::Index>(t)) = found[t];
+    return ours;
+  }
+
+  std::vector<SceneMesh::Joint> joints(const tinygltf::Primitive& primitive, const tinygltf::Skin& skin,
+                                       Eigen::Index vertices, const std::string& where) {
+    const std::string skin_place = "skin '" + skin.name + "'";
+    if (skin.inverseBindMatrices < 0) {
+      refuse(skin_place, "it has no inverse bind matrices, so that its bind pose is unknown",
+             "Export the file anew with the bind pose");
+    }
+    const Eigen::MatrixXd matrices = numbers(skin.inverseBindMatrices, 16, skin_place);
+    if (matrices.cols() < static_cast<Eigen::Index>(skin.joints.size())) {
+      refuse(skin_place, "it has " + std::to_string(matrices.cols()) + " inverse bind matrices for " +
+                             std::to_string(skin.joints.size()) + " joints");
+    }
+    std::vector<SceneMesh::Joint> ours(skin.joints.size());
+    for (std::size_t j = 0; j < ours.size(); ++j) {
+      ours[j].node = static_cast<int>(place(skin.joints[j], skin_place));
+      ours[j].inverse_bind_matrix.matrix() = matrices.col(static_cast<Eigen::Index>(j)).reshaped(4, 4);
+      ours[j].inverse_bind_matrix.makeAffine();
+      if (!ours[j].inverse_bind_matrix.matrix().allFinite()) refuse(skin_place, "an inverse bind matrix is not finite");
+    }
+    for (int set = 0; read_weights(primitive, set, vertices, where, ours); ++set) {
+    }
+    return ours;
+  }
+
+  /// Four influences a vertex from JOINTS_<set> and WEIGHTS_<set>; false when there is no such set.
+  bool read_weights(const tinygltf::Primitive& primitive, int set, Eigen::Index vertices, const std::string& where,
+                    std::vector<SceneMesh::Joint>& ours) {
+    const auto joint_entry = primitive.attributes.find("JOINTS_" + std::to_string(set));
+    const auto weight_entry = primitive.attributes.find("WEIGHTS_" + std::to_string(set));
+    if (joint_entry == primitive.attributes.end() || weight_entry == primitive.attributes.end()) return false;
+    const Eigen::MatrixXd joint = numbers(joint_entry->second, 4, where);
+    const Eigen::MatrixXd weight = numbers(weight_entry->second, 4, where, true);
+    if (joint.cols() != vertices || weight.cols() != vertices) refuse(where, "it has not as many skin weights as vertices");
+    int dropped = 0;
+    for (Eigen::Index v = 0; v < vertices; ++v) {
+      for (Eigen::Index i = 0; i < 4; ++i) {
+        if (weight(i, v) == 0) continue;
+        const bool sound = weight(i, v) > 0 && std::isfinite(weight(i, v)) && joint(i, v) < static_cast<double>(ours.size());
+        if (sound) ours[static_cast<std::size_t>(joint(i, v))].weights.push_back({static_cast<int>(v), weight(i, v)});
+        dropped += sound ? 0 : 1;
+      }
+    }
+    if (dropped > 0) {
+      scene_.warnings.push_back(where + ": " + std::to_string(dropped) +
+                                " skin weights are negative, not finite or name no joint; they are left out.");
+    }
+    return true;
+  }
+
+  void read_clip(const tinygltf::Animation& animation, std::size_t index) {
+    SceneClip clip;
+    clip.name = animation.name;
+    const std::string where = "clip '" + (clip.name.empty() ? std::to_string(index) : clip.name) + "'";
+    std::vector<Channel> by_node(scene_.nodes.size());
+    for (const tinygltf::AnimationChannel& channel : animation.channels) {
+      if (channel.target_node < 0) continue;
+      const std::size_t node = place(channel.target_node, where);
+      const bool turns = channel.target_path == "rotation";
+      if (!turns && channel.target_path != "translation" && channel.target_path != "scale") continue;  // morph weights
+      Track& track = turns                            ? by_node[node].rotation
+                     : channel.target_path == "scale" ? by_node[node].scale
+                                                      : by_node[node].translation;
+      track = read_track(at(animation.samplers, channel.sampler, where), turns ? 4 : 3,
+                         where + ", node '" + scene_.nodes[node].name + "'");
+      clip.duration_s = std::max(clip.duration_s, track.times.back());
+    }
+    for (std::size_t n = 0; n < by_node.size(); ++n) {
+      by_node[n].node = static_cast<int>(n);
+      if (by_node[n].translation.times.empty() && by_node[n].rotation.times.empty() && by_node[n].scale.times.empty())
+        continue;
+      clip.channels.push_back(std::move(by_node[n]));
+    }
+    scene_.clips.push_back(std::move(clip));
+  }
+
+  Track read_track(const tinygltf::AnimationSampler& sampler, Eigen::Index rows, const std::string& where) const {
+    Track track;
+    if (sampler.interpolation == "STEP") track.interpolation = Interpolation::kStep;
+    if (sampler.interpolation == "CUBICSPLINE") track.interpolation = Interpolation::kCubic;
+    const bool cubic = track.interpolation == Interpolation::kCubic;
+    const Eigen::MatrixXd times = numbers(sampler.input, 1, where);
+    const Eigen::MatrixXd output = numbers(sampler.output, rows, where, rows == 4);
+    const Eigen::Index keys = times.cols();
+    if (output.cols() != keys * (cubic ? 3 : 1)) {
+      refuse(where, "it has " + std::to_string(output.cols()) + " values for " + std::to_string(keys) + " key times");
+    }
+    track.times.assign(times.data(), times.data() + keys);
+    track.values = output;
+    if (cubic) {  // in-tangent, value, out-tangent of each key in turn
+      track.in_tangents = output(Eigen::all, Eigen::seqN(0, keys, 3));
+      track.values = output(Eigen::all, Eigen::seqN(1, keys, 3));
+      track.out_tangents = output(Eigen::all, Eigen::seqN(2, keys, 3));
+    }
+    make_sound(track, path_, where);
+    return track;
+  }
+
+  const std::string path_;
+  const tinygltf::Model model_;
+  Scene scene_;
+  std::vector<int> scene_node_;  // of each node of the file
+};
+
+}  // namespace
+
+Scene read_gltf(const std::string& path) { return GltfReader(path).read(); }
+
+}  // namespace hydrostat::io

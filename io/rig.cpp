@@ -1,0 +1,390 @@
+#include "io/rig.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <tuple>
+
+#include "io/scene_pose.h"
+#include "retarget/error.h"
+
+namespace hydrostat::io {
+namespace {
+
+constexpr double kSameBind = 1e-4;    // distance at which two bind poses are one, relative to the mesh's extent
+constexpr double kWeldGrid = 1e-6;    // relative to the skin's extent
+constexpr double kWeightGrid = 1e-3;  // difference of skin weights that keeps vertices apart
+constexpr double kNoWeight = 1e-6;    // sum of skin weights below which a vertex has none
+
+bool is_singular(const Eigen::Affine3d& transform) {
+  const double size = transform.linear().norm();
+  return !(std::abs(transform.linear().determinant()) > 1e-12 * size * size * size);
+}
+
+double extent_of(const Eigen::Matrix3Xd& points) {
+  return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).maxCoeff();
+}
+
+/// Largest distance between what two transforms make of the corners of a mesh's box.
+double difference(const Eigen::Affine3d& a, const Eigen::Affine3d& b, const Eigen::Matrix3Xd& points) {
+  const Eigen::Vector3d low = points.rowwise().minCoeff(), high = points.rowwise().maxCoeff();
+  double largest = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d at(corner & 1 ? high.x() : low.x(), corner & 2 ? high.y() : low.y(),
+                             corner & 4 ? high.z() : low.z());
+    largest = std::max(largest, (a * at - b * at).norm());
+  }
+  return largest;
+}
+
+double total_weight(const SceneMesh::Joint& joint) {
+  double sum = 0;
+  for (const SceneMesh::Weight& weight : joint.weights) sum += weight.weight;
+  return sum;
+}
+
+bool is_skinned(const SceneMesh& mesh) {
+  return std::any_of(mesh.joints.begin(), mesh.joints.end(),
+                     [](const SceneMesh::Joint& joint) { return !joint.weights.empty(); });
+}
+
+class RigBuilder {
+ public:
+  RigBuilder(const Scene& scene, const std::string& path)
+      : scene_(scene),
+        path_(path),
+        rest_(node_poses(scene, nullptr, 0)),
+        bind_(scene.nodes.size()),
+        bone_of_(scene.nodes.size(), -1) {}
+
+  Rig build() {
+    rig_.to_ours = Eigen::Affine3d(scene_.metres_per_unit * scene_.to_y_up);
+    for (const SceneMesh& mesh : scene_.meshes) {
+      if (is_skinned(mesh)) skinned_.push_back(&mesh);
+    }
+    if (skinned_.empty()) {
+      require_skeleton_alone();
+    } else {
+      warn_of_meshes_left_out();
+      bind_meshes();
+    }
+    add_bones();
+    for (std::size_t m = 0; m < skinned_.size(); ++m) add_mesh(m);
+    if (!skinned_.empty()) {
+      bind_stray_vertices();
+      weld();
+    }
+    return std::move(rig_);
+  }
+
+ private:
+  /// A mesh's joint, how it was bound.
+  struct Bound {
+    bool twin = false;     // its bind pose does not fit the bone's
+    Eigen::Affine3d bind;  // bone space to the common bind space, file units
+    int bone = -1;
+  };
+
+  void require_skeleton_alone() const {
+    const bool moved =
+        std::any_of(scene_.clips.begin(), scene_.clips.end(), [](const SceneClip& clip) { return !clip.channels.empty(); });
+    if (scene_.meshes.empty() && moved) return;
+    throw Error(path_, "skeleton", "no mesh is bound to a skeleton",
+                "Bind the mesh to bones and export it with its skin and its clip");
+  }
+
+  void warn_of_meshes_left_out() {
+    const std::size_t left_out = scene_.meshes.size() - skinned_.size();
+    if (left_out == 0) return;
+    rig_.warnings.push_back(std::to_string(left_out) + " of " + std::to_string(scene_.meshes.size()) +
+                            " meshes are not bound to bones and are left out.");
+  }
+
+  /// Finds one bind pose for the bones of all meshes, and what takes each mesh into it. The mesh of most vertices leads.
+  void bind_meshes() {
+    std::stable_sort(skinned_.begin(), skinned_.end(),
+                     [](const SceneMesh* a, const SceneMesh* b) { return a->vertices.cols() > b->vertices.cols(); });
+    for (const SceneMesh* mesh : skinned_) {
+      for (const SceneMesh::Joint& joint : mesh->joints) {
+        if (joint.weights.empty() || !is_singular(joint.inverse_bind_matrix)) continue;
+        throw Error(path_, "bone '" + name_of(joint.node) + "'", "its inverse bind matrix is singular",
+                    "Give the bone a scale other than 0 in the bind pose");
+      }
+      into_bind_.push_back(into_bind_space(*mesh));
+      bound_.push_back(bind_joints(*mesh, into_bind_.back()));
+    }
+    for (std::size_t m = 0; m < skinned_.size(); ++m) bind_weightless_joints(*skinned_[m], into_bind_[m]);
+  }
+
+  /// What takes the mesh's space to the common bind space, by the heaviest joint whose bind pose is known.
+  Eigen::Affine3d into_bind_space(const SceneMesh& mesh) const {
+    std::vector<const SceneMesh::Joint*> joints;
+    for (const SceneMesh::Joint& joint : mesh.joints) {
+      if (!joint.weights.empty()) joints.push_back(&joint);
+    }
+    std::stable_sort(joints.begin(), joints.end(), [](const SceneMesh::Joint* a, const SceneMesh::Joint* b) {
+      return total_weight(*a) > total_weight(*b);
+    });
+    for (const SceneMesh::Joint* joint : joints) {
+      const std::optional<Eigen::Affine3d>& bind = bind_[static_cast<std::size_t>(joint->node)];
+      if (bind) return *bind * joint->inverse_bind_matrix;
+    }
+    const std::optional<Eigen::Affine3d> beside = bind_beside(joints.front()->node);
+    return beside ? *beside * joints.front()->inverse_bind_matrix : Eigen::Affine3d::Identity();
+  }
+
+  std::vector<Bound> bind_joints(const SceneMesh& mesh, const Eigen::Affine3d& into_bind) {
+    std::vector<Bound> bound(mesh.joints.size());
+    const double tolerance = kSameBind * extent_of(into_bind * mesh.vertices);
+    for (std::size_t j = 0; j < mesh.joints.size(); ++j) {
+      const SceneMesh::Joint& joint = mesh.joints[j];
+      if (joint.weights.empty()) continue;
+      bound[j].bind = into_bind * joint.inverse_bind_matrix.inverse();
+      std::optional<Eigen::Affine3d>& bind = bind_[static_cast<std::size_t>(joint.node)];
+      if (!bind) bind = bound[j].bind;
+      bound[j].twin = difference(*bind * joint.inverse_bind_matrix, into_bind, mesh.vertices) > tolerance;
+      weighted_.resize(scene_.nodes.size(), false);
+      weighted_[static_cast<std::size_t>(joint.node)] = true;
+    }
+    return bound;
+  }
+
+  void bind_weightless_joints(const SceneMesh& mesh, const Eigen::Affine3d& into_bind) {
+    for (const SceneMesh::Joint& joint : mesh.joints) {
+      std::optional<Eigen::Affine3d>& bind = bind_[static_cast<std::size_t>(joint.node)];
+      if (!bind && !is_singular(joint.inverse_bind_matrix)) bind = into_bind * joint.inverse_bind_matrix.inverse();
+    }
+  }
+
+  /// The bind pose of a node that has none: it stands to the nearest bound ancestor, or else descendant, as it does at rest.
+  std::optional<Eigen::Affine3d> bind_beside(int node) const {
+    for (int up = node; up >= 0; up = scene_.nodes[static_cast<std::size_t>(up)].parent) {
+      if (bind_[static_cast<std::size_t>(up)]) return stand_beside(up, node);
+    }
+    for (int down = node + 1; down < static_cast<int>(scene_.nodes.size()); ++down) {
+      if (bind_[static_cast<std::size_t>(down)] && is_below(down, node)) return stand_beside(down, node);
+    }
+    return std::nullopt;
+  }
+
+  Eigen::Affine3d stand_beside(int bound, int node) const {
+    const Eigen::Affine3d& from = rest_[static_cast<std::size_t>(bound)];
+    const Eigen::Affine3d& bind = *bind_[static_cast<std::size_t>(bound)];
+    if (is_singular(from)) return bind;  // scaled to nothing at rest: no place beside it can be told
+    return bind * from.inverse() * rest_[static_cast<std::size_t>(node)];
+  }
+
+  bool is_below(int node, int ancestor) const {
+    while (node > ancestor) node = scene_.nodes[static_cast<std::size_t>(node)].parent;
+    return node == ancestor;
+  }
+
+  const std::string& name_of(int node) const { return scene_.nodes[static_cast<std::size_t>(node)].name; }
+
+  /// Which scene nodes are bones.
+  std::vector<bool> bones() const {
+    const std::size_t count = scene_.nodes.size();
+    std::vector<bool> moved(count, false), leads(count, false), hangs(count, false), chosen(count, false);
+    for (const SceneClip& clip : scene_.clips) {
+      for (const Channel& channel : clip.channels) moved[static_cast<std::size_t>(channel.node)] = true;
+    }
+    const auto is_named = [&](std::size_t n) {
+      return skinned_.empty() ? static_cast<bool>(moved[n]) : scene_.nodes[n].is_joint;
+    };
+    for (std::size_t n = count; n-- > 0;) {  // what leads down to a named bone
+      const int parent = scene_.nodes[n].parent;
+      if (parent >= 0 && (is_named(n) || leads[n])) leads[static_cast<std::size_t>(parent)] = true;
+    }
+    for (std::size_t n = 0; n < count; ++n) {
+      const SceneNode& node = scene_.nodes[n];
+      const std::size_t parent = static_cast<std::size_t>(std::max(node.parent, 0));
+      const bool below_bone = node.parent >= 0 && chosen[parent];
+      const bool below_weights = node.parent >= 0 && hangs[parent];
+      hangs[n] = (skinned_.empty() ? is_named(n) : weighted_[n]) || (below_weights && !node.holds_mesh);
+      chosen[n] = is_named(n) || hangs[n] || (leads[n] && (moved[n] || below_bone));
+    }
+    return chosen;
+  }
+
+  void add_bones() {
+    const std::vector<bool> chosen = bones();
+    for (std::size_t n = 0; n < chosen.size(); ++n) {
+      if (!chosen[n]) continue;
+      int parent = scene_.nodes[n].parent;
+      while (parent >= 0 && bone_of_[static_cast<std::size_t>(parent)] < 0)
+        parent = scene_.nodes[static_cast<std::size_t>(parent)].parent;
+      const Eigen::Affine3d bind = skinned_.empty() ? rest_[n]
+                                   : bind_[n]       ? *bind_[n]
+                                                    : bind_beside(static_cast<int>(n)).value_or(rest_[n]);
+      bone_of_[n] = add_bone(static_cast<int>(n), parent < 0 ? -1 : bone_of_[static_cast<std::size_t>(parent)], bind,
+                             !skinned_.empty() && weighted_[n]);
+    }
+    int twins = 0;
+    for (std::size_t m = 0; m < bound_.size(); ++m) {
+      for (std::size_t j = 0; j < bound_[m].size(); ++j) {
+        Bound& bound = bound_[m][j];
+        const int node = skinned_[m]->joints[j].node;
+        bound.bone = bone_of_[static_cast<std::size_t>(node)];
+        if (!bound.twin) continue;
+        bound.bone = add_bone(node, bound.bone, bound.bind, true);
+        ++twins;
+      }
+    }
+    if (twins > 0) {
+      rig_.warnings.push_back("Meshes were bound in poses that do not fit together: " + std::to_string(twins) +
+                              " bones have a twin of another bind pose.");
+    }
+  }
+
+  int add_bone(int node, int parent, const Eigen::Affine3d& bind, bool weighted) {
+    std::string name = name_of(node);
+    const int uses = ++uses_of_name_[name];
+    if (uses > 1) name.append(1, '#').append(std::to_string(uses));
+    rig_.skeleton.names.push_back(name);
+    rig_.skeleton.parents.push_back(parent);
+    rig_.skeleton.bind_pose.push_back(rig_.to_ours * bind);
+    rig_.skeleton.weighted.push_back(weighted);
+    rig_.scene_nodes.push_back(node);
+    return rig_.skeleton.count() - 1;
+  }
+
+  /// Appends a mesh's vertices in the common bind pose, its triangles and its weights, made to sum to 1.
+  void add_mesh(std::size_t m) {
+    const SceneMesh& mesh = *skinned_[m];
+    retarget::SkinnedMesh& skin = rig_.skin;
+    const Eigen::Index first = skin.vertices.cols(), first_triangle = skin.triangles.cols();
+    skin.vertices.conservativeResize(Eigen::NoChange, first + mesh.vertices.cols());
+    skin.vertices.rightCols(mesh.vertices.cols()) = rig_.to_ours * into_bind_[m] * mesh.vertices;
+    skin.triangles.conservativeResize(Eigen::NoChange, first_triangle + mesh.triangles.cols());
+    skin.triangles.rightCols(mesh.triangles.cols()) = mesh.triangles.array() + static_cast<int>(first);
+    if (into_bind_[m].linear().determinant() < 0) {
+      skin.triangles.rightCols(mesh.triangles.cols()).row(1).swap(skin.triangles.rightCols(mesh.triangles.cols()).row(2));
+    }
+    std::vector<std::map<int, double>> sums(static_cast<std::size_t>(mesh.vertices.cols()));
+    for (std::size_t j = 0; j < mesh.joints.size(); ++j) {
+      for (const SceneMesh::Weight& weight : mesh.joints[j].weights) {
+        sums[static_cast<std::size_t>(weight.vertex)][bound_[m][j].bone] += weight.weight;
+      }
+    }
+    for (const std::map<int, double>& weights : sums) {
+      double total = 0;
+      for (const auto& [bone, weight] : weights) total += weight;
+      std::vector<retarget::SkinnedMesh::Influence> influences;
+      for (const auto& [bone, weight] : weights) {
+        if (total > kNoWeight && weight > 0) influences.push_back({bone, weight / total});
+      }
+      skin.skin_weights.push_back(std::move(influences));
+    }
+  }
+
+  /// Binds every vertex without weights to the weighted bone whose origin, or line to a child, is nearest.
+  void bind_stray_vertices() {
+    int strays = 0;
+    for (Eigen::Index v = 0; v < rig_.skin.vertices.cols(); ++v) {
+      std::vector<retarget::SkinnedMesh::Influence>& influences = rig_.skin.skin_weights[static_cast<std::size_t>(v)];
+      if (!influences.empty()) continue;
+      influences.push_back({nearest_bone(rig_.skin.vertices.col(v)), 1});
+      ++strays;
+    }
+    if (strays > 0)
+      rig_.warnings.push_back(std::to_string(strays) + " vertices have no skin weights; each goes with the nearest bone.");
+  }
+
+  int nearest_bone(const Eigen::Vector3d& point) const {
+    const retarget::Skeleton& skeleton = rig_.skeleton;
+    double least = std::numeric_limits<double>::infinity();
+    int nearest = -1;
+    const auto consider = [&](int bone, double distance) {
+      if (distance >= least || !skeleton.weighted[static_cast<std::size_t>(bone)]) return;
+      least = distance;
+      nearest = bone;
+    };
+    for (int b = 0; b < skeleton.count(); ++b) {
+      const Eigen::Vector3d end = skeleton.bind_pose[static_cast<std::size_t>(b)].translation();
+      consider(b, (point - end).norm());
+      const int parent = skeleton.parents[static_cast<std::size_t>(b)];
+      if (parent < 0) continue;
+      const Eigen::Vector3d start = skeleton.bind_pose[static_cast<std::size_t>(parent)].translation();
+      const double along = (point - start).dot(end - start) / std::max((end - start).squaredNorm(), 1e-300);
+      consider(parent, (point - start - std::clamp(along, 0.0, 1.0) * (end - start)).norm());
+    }
+    return nearest;
+  }
+
+  /// Makes one vertex of those that share place and weights (seams of texture and normals), and drops triangles that
+  /// collapse.
+  void weld() {
+    retarget::SkinnedMesh& skin = rig_.skin;
+    const double grid = kWeldGrid * std::max(extent_of(skin.vertices), 1e-12);
+    using Place = std::array<long long, 3>;
+    std::map<Place, std::vector<int>> welded_at;
+    std::vector<int> now(static_cast<std::size_t>(skin.vertices.cols()));
+    retarget::SkinnedMesh welded;
+    welded.vertices.resize(3, skin.vertices.cols());
+    for (Eigen::Index v = 0; v < skin.vertices.cols(); ++v) {
+      const auto& weights = skin.skin_weights[static_cast<std::size_t>(v)];
+      Place place;
+      for (int axis = 0; axis < 3; ++axis)
+        place[static_cast<std::size_t>(axis)] = std::llround(skin.vertices(axis, v) / grid);
+      std::vector<int>& here = welded_at[place];
+      const auto same = std::find_if(here.begin(), here.end(), [&](int other) {
+        return weights_agree(weights, welded.skin_weights[static_cast<std::size_t>(other)]);
+      });
+      if (same == here.end()) {
+        here.push_back(static_cast<int>(welded.skin_weights.size()));
+        welded.vertices.col(here.back()) = skin.vertices.col(v);
+        welded.skin_weights.push_back(weights);
+        now[static_cast<std::size_t>(v)] = here.back();
+      } else {
+        now[static_cast<std::size_t>(v)] = *same;
+      }
+    }
+    welded.vertices.conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(welded.skin_weights.size()));
+    welded.triangles.resize(3, skin.triangles.cols());
+    Eigen::Index kept = 0;
+    for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
+      const Eigen::Vector3i corners =
+          skin.triangles.col(t).unaryExpr([&](int v) { return now[static_cast<std::size_t>(v)]; });
+      const bool flat = corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
+      if (!flat) welded.triangles.col(kept++) = corners;
+    }
+    welded.triangles.conservativeResize(Eigen::NoChange, kept);
+    skin = std::move(welded);
+  }
+
+  /// Both lists are sorted by bone.
+  static bool weights_agree(const std::vector<retarget::SkinnedMesh::Influence>& a,
+                            const std::vector<retarget::SkinnedMesh::Influence>& b) {
+    return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
+             return x.bone == y.bone && std::abs(x.weight - y.weight) < kWeightGrid;
+           });
+  }
+
+  const Scene& scene_;
+  const std::string& path_;
+  const std::vector<Eigen::Affine3d> rest_;           // of every scene node
+  std::vector<std::optional<Eigen::Affine3d>> bind_;  // of every scene node, bone space to the common bind space, file units
+  std::vector<bool> weighted_;                        // of every scene node
+  std::vector<int> bone_of_;                          // of every scene node; -1 is none
+  std::vector<const SceneMesh*> skinned_;
+  std::vector<Eigen::Affine3d> into_bind_;  // of every skinned mesh
+  std::vector<std::vector<Bound>> bound_;   // of every skinned mesh, its joints
+  std::map<std::string, int> uses_of_name_;
+  Rig rig_;
+};
+
+}  // namespace
+
+Rig build_rig(const Scene& scene, const std::string& path) { return RigBuilder(scene, path).build(); }
+
+std::vector<Eigen::Affine3d> bone_poses(const Rig& rig, const Scene& scene, const SceneClip& clip, double time_s) {
+  const std::vector<Eigen::Affine3d> nodes = node_poses(scene, &clip, time_s);
+  std::vector<Eigen::Affine3d> poses;
+  for (const int node : rig.scene_nodes) poses.push_back(rig.to_ours * nodes[static_cast<std::size_t>(node)]);
+  return poses;
+}
+
+}  // namespace hydrostat::io

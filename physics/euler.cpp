@@ -12,6 +12,7 @@ namespace {
 constexpr double kSinkage = 0.0005;      // of the body's size [-]: how deep one point sinks that bears the whole weight
 constexpr double kWeightOfNoGravity = 9.81;  // [m/s2] takes gravity's place in the contact stiffness where there is none
 constexpr int kNewtonSteps = 50;             // three or four are the rule
+constexpr int kFreeSteps = 4;                 // after them the normal force behind Coulomb's limit follows by halves
 // A node's residual force is told as the velocity that it would give the node in a step, over the body's size [1/s].
 constexpr double kResidual = 1e-5;   // small enough
 constexpr double kGivenUp = 1e-2;    // after the last iterate: no solution was found
@@ -37,6 +38,7 @@ class EulerStepper final : public Stepper {
         contact_force_(3, scene.contact_points.count()),
         touching_(static_cast<std::size_t>(scene.contact_points.count()), 0),
         friction_limit_(scene.contact_points.count()),
+        last_limit_(scene.contact_points.count()),
         foreseen_(3, scene.body.node_count()),
         moved_(3, scene.body.node_count()),
         trial_(3, scene.body.node_count()),
@@ -70,6 +72,12 @@ class EulerStepper final : public Stepper {
       update_friction_limits(state.x);
       find_residual(state.x, dt, activation);
       if (!(residual_speed(dt) > kResidual * size_)) break;
+      if (scene_.has_ground && k >= kFreeSteps) {
+        // Normal force and friction that answer each other by turns would go round for ever.
+        friction_limit_ = 0.5 * (friction_limit_ + last_limit_);
+        find_residual(state.x, dt, activation);
+      }
+      last_limit_ = friction_limit_;
       if (!move_downhill(dt, activation, state.x)) break;
     }
     update_friction_limits(state.x);
@@ -253,7 +261,7 @@ class EulerStepper final : public Stepper {
   double size_ = 0, contact_stiffness_ = 0;          // [m], [N/m] of a contact point, normal and tangential
   Eigen::Matrix3Xd anchor_, contact_force_;          // [m], [N] 3 x P
   std::vector<char> touching_;                       // P: at the end of the last step
-  Eigen::VectorXd friction_limit_;                   // [N] P
+  Eigen::VectorXd friction_limit_, last_limit_;      // [N] P, of this and the last Newton step
   Eigen::Matrix3Xd foreseen_;                        // [m] where gravity and effects alone take the nodes
   Eigen::Matrix3Xd moved_, trial_, residual_, force_;
   Eigen::VectorXd direction_;

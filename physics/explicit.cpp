@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kStepMargin = 0.8;    // of the linear stability bound at rest
 constexpr double kPushOutSpeed = 0.5;  // [m/s] at most, with which a point that starts below the ground is lifted
+constexpr double kReach = 0.1;         // of the shortest edge [-]: points as near as that are watched
 constexpr int kContactSweeps = 30;
 constexpr double kContactTolerance = 1e-7;  // [m/s] change of a contact point's velocity in a sweep
 
@@ -79,7 +80,7 @@ class ExplicitStepper final : public Stepper {
     impulses.effect_nodes.setZero();
     impulses.effect_moment.setZero();
     impulses.gravity_moment.setZero();
-    if (scene_.has_ground) find_candidates(dt, state);
+    double reach = 0;  // [m] that the body may still move before points beyond the candidates can touch
     for (int s = 0; s < substeps; ++s) {
       force_.setZero();
       add_internal_forces(scene_.body, state, activation, force_);
@@ -93,14 +94,20 @@ class ExplicitStepper final : public Stepper {
       double fastest = 0;
       for (int i = 0; i < scene_.body.node_count(); ++i) {
         state.v.col(i) += h * (inverse_mass_[i] * force_.col(i) + scene_.gravity);
-        fastest = std::max(fastest, state.v.col(i).squaredNorm());
+        const double speed_squared = state.v.col(i).squaredNorm();
+        if (!(speed_squared <= fastest)) fastest = speed_squared;  // keeps what is not a number
       }
       impulses.gravity_moment += h * (state.x * scene_.body.mass).cross(scene_.gravity);
-      if (!(std::sqrt(fastest) * h < shortest_edge_)) {
+      const double farthest = h * std::sqrt(fastest);
+      if (!(farthest < shortest_edge_)) {
         state = start_;
         return Termination::kDiverged;
       }
-      if (scene_.has_ground) push_apart(h, state, impulses);
+      if (scene_.has_ground) {
+        reach -= 2 * farthest + h * kPushOutSpeed;  // what contact itself may add is within that
+        if (reach < 0) reach = find_candidates(2 * farthest + h * kPushOutSpeed, state);
+        push_apart(h, state, impulses);
+      }
       state.x += h * state.v;
     }
     return Termination::kDone;
@@ -111,18 +118,19 @@ class ExplicitStepper final : public Stepper {
     return scene_.ground.normal.dot(scene_.contact_points.of(x, p)) - scene_.ground.offset;
   }
 
-  /// The points that may touch the ground within dt.
-  void find_candidates(double dt, const State& state) {
+  /// The points that may touch the ground in this substep, in which no node moves farther than `farthest` [m], and in some to
+  /// come; what is left for those is returned [m].
+  double find_candidates(double farthest, const State& state) {
+    const double reach = kReach * shortest_edge_;
     candidates_.clear();
-    const double reach_of_gravity = scene_.gravity.norm() * dt * dt;
     for (int p = 0; p < scene_.contact_points.count(); ++p) {
-      const double speed = scene_.contact_points.of(state.v, p).norm();
-      if (gap(state.x, p) < 3 * speed * dt + reach_of_gravity + 0.02 * shortest_edge_) {
+      if (gap(state.x, p) < reach + farthest) {
         candidates_.push_back(p);
       } else {
         impulse_.col(p).setZero();
       }
     }
+    return reach;
   }
 
   void apply(int p, const Eigen::Vector3d& impulse, State& state) const {

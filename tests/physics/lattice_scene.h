@@ -78,10 +78,10 @@ inline Body bar(int nx, int ny, int nz, double cell, const Material& material = 
   return body_of(make_lattice(nx, ny, nz, cell), material);
 }
 
-/// A box of 12 x 3 x 4 cells of 0.08 m on four legs, about 1 m long: 200 nodes and more.
+/// A box of 9 x 2 x 3 cells of 0.1 m on four legs of two cells, about 1 m long: some 200 nodes.
 inline Body four_legged(const Material& material = {}) {
-  return body_of(make_lattice(12, 6, 4, 0.08, [](int i, int j, int k) { return j >= 3 || ((i < 2 || i >= 10) && (k < 1 || k >= 3)); }),
-                 material);
+  const auto keep = [](int i, int j, int k) { return j >= 2 || ((i == 0 || i == 8) && k != 1); };
+  return body_of(make_lattice(9, 4, 3, 0.1, keep), material);
 }
 
 /// A bar whose cells are bent out of shape and unevenly filled, from a seed.

@@ -10,27 +10,35 @@ namespace {
 
 constexpr double kStepMargin = 0.8;    // of the linear stability bound at rest
 constexpr double kPushOutSpeed = 0.5;  // [m/s] at most, with which a point that starts below the ground is lifted
+constexpr double kReach = 0.1;         // of the shortest edge [-]: points as near as that are watched
 constexpr int kContactSweeps = 30;
 constexpr double kContactTolerance = 1e-7;  // [m/s] change of a contact point's velocity in a sweep
 
-/// Largest eigenvalue [1/s2] of M^-1 K at rest, by power iteration.
-double largest_frequency_squared(const Body& body) {
-  SystemMatrix stiffness(body);
+/// The largest substep [s] for which the linear motion about the rest shape is stable: 4 M - 2 h D - h^2 K stays positive, so
+/// the roots of the amplification polynomial stay in the unit disc. The dashpots act along edges alone, the stiffest modes are
+/// those of volume: with D itself the bound is several times longer than with D = (largest damping time) K.
+double stable_substep_at_rest(const Body& body) {
+  SystemMatrix stiffness(body), damping(body);
   stiffness.set_zero();
   stiffness.add_stiffness(body, body.rest, Eigen::VectorXd::Ones(body.edge_count()), 1);
+  damping.set_zero();
+  damping.add_damping(body, body.rest, 1);
   Eigen::VectorXd root_mass(3 * body.node_count());
   for (int i = 0; i < body.node_count(); ++i) root_mass.segment<3>(3 * i).setConstant(std::sqrt(body.mass[i]));
-  Eigen::VectorXd y(root_mass.size());
+  Eigen::VectorXd y(root_mass.size()), kz(y.size()), dz(y.size());
   for (Eigen::Index i = 0; i < y.size(); ++i) y[i] = std::cos(1.7 * static_cast<double>(i * i % 97));
-  double eigenvalue = 0;
-  for (int k = 0; k < 100; ++k) {
+  // Power iteration on M^-1 (2 h D + h^2 K) / 4 while h follows its largest eigenvalue toward 1, by Rayleigh's quotient.
+  double h = 1;
+  for (int k = 0; k < 300; ++k) {
     y.normalize();
     const Eigen::VectorXd z = y.cwiseQuotient(root_mass);
-    const Eigen::VectorXd product = (stiffness.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
-    eigenvalue = product.norm();
-    y = product;
+    kz = (stiffness.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
+    dz = (damping.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
+    const double omega_squared = y.dot(kz), c = y.dot(dz);
+    h = (std::sqrt(c * c + 4 * omega_squared) - c) / omega_squared;
+    y = 2 * h * dz + h * h * kz;
   }
-  return 1.05 * eigenvalue;
+  return h / 1.02;  // what 300 iterations may still lack
 }
 
 /// Symplectic Euler (velocity Verlet with velocities at half steps) with contact by impulses.
@@ -46,14 +54,7 @@ class ExplicitStepper final : public Stepper {
         impulse_(Eigen::Matrix3Xd::Zero(3, scene.contact_points.count())),
         inverse_mass_(scene.body.mass.cwiseInverse()),
         point_inverse_mass_(scene.contact_points.count()) {
-    const double omega_squared = largest_frequency_squared(scene.body);
-    double damping_time = 0;
-    for (int e = 0; e < scene.body.edge_count(); ++e) {
-      damping_time = std::max(damping_time, scene.body.edge_damping[e] / scene.body.edge_stiffness[e]);
-    }
-    // 4 - 2 h c - h^2 w^2 > 0 with c = damping_time * w^2: the roots of the amplification polynomial stay in the unit disc.
-    const double c = damping_time * omega_squared;
-    stable_substep_ = kStepMargin * (std::sqrt(c * c + 4 * omega_squared) - c) / omega_squared;
+    stable_substep_ = kStepMargin * stable_substep_at_rest(scene.body);
     const ContactPoints& points = scene.contact_points;
     for (int p = 0; p < points.count(); ++p) {
       point_inverse_mass_[p] = 0;
@@ -79,7 +80,7 @@ class ExplicitStepper final : public Stepper {
     impulses.effect_nodes.setZero();
     impulses.effect_moment.setZero();
     impulses.gravity_moment.setZero();
-    if (scene_.has_ground) find_candidates(dt, state);
+    double reach = 0;  // [m] that the body may still move before points beyond the candidates can touch
     for (int s = 0; s < substeps; ++s) {
       force_.setZero();
       add_internal_forces(scene_.body, state, activation, force_);
@@ -93,14 +94,20 @@ class ExplicitStepper final : public Stepper {
       double fastest = 0;
       for (int i = 0; i < scene_.body.node_count(); ++i) {
         state.v.col(i) += h * (inverse_mass_[i] * force_.col(i) + scene_.gravity);
-        fastest = std::max(fastest, state.v.col(i).squaredNorm());
+        const double speed_squared = state.v.col(i).squaredNorm();
+        if (!(speed_squared <= fastest)) fastest = speed_squared;  // keeps what is not a number
       }
       impulses.gravity_moment += h * (state.x * scene_.body.mass).cross(scene_.gravity);
-      if (!(std::sqrt(fastest) * h < shortest_edge_)) {
+      const double farthest = h * std::sqrt(fastest);
+      if (!(farthest < shortest_edge_)) {
         state = start_;
         return Termination::kDiverged;
       }
-      if (scene_.has_ground) push_apart(h, state, impulses);
+      if (scene_.has_ground) {
+        reach -= 2 * farthest + h * kPushOutSpeed;  // what contact itself may add is within that
+        if (reach < 0) reach = find_candidates(2 * farthest + h * kPushOutSpeed, state);
+        push_apart(h, state, impulses);
+      }
       state.x += h * state.v;
     }
     return Termination::kDone;
@@ -111,18 +118,19 @@ class ExplicitStepper final : public Stepper {
     return scene_.ground.normal.dot(scene_.contact_points.of(x, p)) - scene_.ground.offset;
   }
 
-  /// The points that may touch the ground within dt.
-  void find_candidates(double dt, const State& state) {
+  /// The points that may touch the ground in this substep, in which no node moves farther than `farthest` [m], and in some to
+  /// come; what is left for those is returned [m].
+  double find_candidates(double farthest, const State& state) {
+    const double reach = kReach * shortest_edge_;
     candidates_.clear();
-    const double reach_of_gravity = scene_.gravity.norm() * dt * dt;
     for (int p = 0; p < scene_.contact_points.count(); ++p) {
-      const double speed = scene_.contact_points.of(state.v, p).norm();
-      if (gap(state.x, p) < 3 * speed * dt + reach_of_gravity + 0.02 * shortest_edge_) {
+      if (gap(state.x, p) < reach + farthest) {
         candidates_.push_back(p);
       } else {
         impulse_.col(p).setZero();
       }
     }
+    return reach;
   }
 
   void apply(int p, const Eigen::Vector3d& impulse, State& state) const {

@@ -6,6 +6,8 @@ std::string name_of(Method method) {
   switch (method) {
     case Method::kExplicit:
       return "explicit";
+    case Method::kEuler:
+      return "euler";
   }
   return {};
 }
@@ -14,6 +16,8 @@ std::unique_ptr<Stepper> make_stepper(Method method, const Scene& scene) {
   switch (method) {
     case Method::kExplicit:
       return make_explicit_stepper(scene);
+    case Method::kEuler:
+      return make_euler_stepper(scene);
   }
   return nullptr;
 }

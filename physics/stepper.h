@@ -40,12 +40,13 @@ class Stepper {
   virtual double substep(double dt) const = 0;
 };
 
-enum class Method { kExplicit };
+enum class Method { kExplicit, kEuler };
 std::string name_of(Method method);
 /// Throws nothing; every scene is accepted. The scene must outlive the stepper.
 std::unique_ptr<Stepper> make_stepper(Method method, const Scene& scene);
 
 std::unique_ptr<Stepper> make_explicit_stepper(const Scene& scene);
+std::unique_ptr<Stepper> make_euler_stepper(const Scene& scene);
 
 Impulses make_impulses(const Scene& scene);
 

@@ -1,5 +1,7 @@
 #include "physics/system_matrix.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cassert>
 
@@ -46,7 +48,66 @@ SystemMatrix::SystemMatrix(const Body& body) {
       }
     }
   }
-  factor_.analyzePattern(matrix_);
+  find_factor_pattern(body);
+}
+
+void SystemMatrix::find_factor_pattern(const Body& body) {
+  const int nodes = body.node_count();
+  std::vector<Eigen::Triplet<double>> links;
+  for (int i = 0; i < nodes; ++i) links.emplace_back(i, i, 1);
+  for (int e = 0; e < body.edge_count(); ++e) {
+    links.emplace_back(body.edges(0, e), body.edges(1, e), 1);
+    links.emplace_back(body.edges(1, e), body.edges(0, e), 1);
+  }
+  Eigen::SparseMatrix<double> graph(nodes, nodes);
+  graph.setFromTriplets(links.begin(), links.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
+  Eigen::AMDOrdering<int>()(graph, permutation);
+  order_.assign(permutation.indices().begin(), permutation.indices().end());
+  std::vector<int> place(order_.size());
+  for (int k = 0; k < nodes; ++k) place[static_cast<std::size_t>(order_[static_cast<std::size_t>(k)])] = k;
+
+  std::vector<std::vector<Source>> sources(order_.size());
+  for (int e = 0; e < body.edge_count(); ++e) {
+    const int low = place[static_cast<std::size_t>(body.edges(0, e))], high = place[static_cast<std::size_t>(body.edges(1, e))];
+    // The matrix holds (high node, low node); work_ wants (column, row), the place in the upper triangle.
+    sources[static_cast<std::size_t>(std::max(low, high))].push_back({std::min(low, high), e, low < high});
+  }
+  // Row k of the factor: what its entries in the matrix reach on their way up the elimination tree.
+  std::vector<int> parent(order_.size(), -1), seen(order_.size(), -1);
+  std::vector<std::vector<int>> columns_of_row(order_.size());
+  std::vector<int> count(order_.size(), 0);
+  source_begin_ = entry_begin_ = {0};
+  for (int k = 0; k < nodes; ++k) {
+    const auto row = static_cast<std::size_t>(k);
+    seen[row] = k;
+    for (const Source& source : sources[row]) {
+      source_.push_back(source);
+      for (int i = source.column; seen[static_cast<std::size_t>(i)] != k; i = parent[static_cast<std::size_t>(i)]) {
+        if (parent[static_cast<std::size_t>(i)] < 0) parent[static_cast<std::size_t>(i)] = k;
+        columns_of_row[row].push_back(i);
+        ++count[static_cast<std::size_t>(i)];
+        seen[static_cast<std::size_t>(i)] = k;
+      }
+    }
+    std::sort(columns_of_row[row].begin(), columns_of_row[row].end());
+    source_begin_.push_back(static_cast<int>(source_.size()));
+  }
+  column_begin_ = {0};
+  for (const int c : count) column_begin_.push_back(column_begin_.back() + c);
+  row_.resize(static_cast<std::size_t>(column_begin_.back()));
+  std::vector<int> next(column_begin_.begin(), column_begin_.end() - 1);
+  for (int k = 0; k < nodes; ++k) {
+    for (const int i : columns_of_row[static_cast<std::size_t>(k)]) {
+      const int slot = next[static_cast<std::size_t>(i)]++;
+      row_[static_cast<std::size_t>(slot)] = k;
+      entry_.push_back({i, slot});
+    }
+    entry_begin_.push_back(static_cast<int>(entry_.size()));
+  }
+  l_.resize(row_.size());
+  d_inverse_.resize(order_.size());
+  work_.assign(order_.size(), Eigen::Matrix3d::Zero());
 }
 
 void SystemMatrix::set_zero() { std::fill_n(matrix_.valuePtr(), matrix_.nonZeros(), 0.0); }
@@ -138,29 +199,61 @@ void SystemMatrix::add_contact(const ContactPoints& points, int p, const Eigen::
 }
 
 bool SystemMatrix::factor() {
-  factor_.factorize(matrix_);
-  return factor_.info() == Eigen::Success && factor_.vectorD().minCoeff() > 0;
+  const double* const values = matrix_.valuePtr();
+  for (std::size_t k = 0; k < order_.size(); ++k) {
+    for (int s = source_begin_[k]; s < source_begin_[k + 1]; ++s) {
+      const Source& source = source_[static_cast<std::size_t>(s)];
+      Eigen::Matrix3d& block = work_[static_cast<std::size_t>(source.column)];
+      for (int c = 0; c < 3; ++c) block.col(c) = Eigen::Vector3d::Map(values + edge_slot_(c, source.edge));
+      if (source.transposed) block.transposeInPlace();
+    }
+    Eigen::Matrix3d diagonal;
+    for (int c = 0; c < 3; ++c) {
+      for (int r = c; r < 3; ++r) diagonal(r, c) = diagonal(c, r) = values[diagonal_slot_(c, order_[k]) + r - c];
+    }
+    for (int n = entry_begin_[k]; n < entry_begin_[k + 1]; ++n) {
+      const auto [column, slot] = entry_[static_cast<std::size_t>(n)];
+      Eigen::Matrix3d& block = work_[static_cast<std::size_t>(column)];
+      const Eigen::Matrix3d upper = block;
+      block.setZero();
+      for (int p = column_begin_[static_cast<std::size_t>(column)]; p < slot; ++p) {
+        work_[static_cast<std::size_t>(row_[static_cast<std::size_t>(p)])].noalias() -= l_[static_cast<std::size_t>(p)] * upper;
+      }
+      Eigen::Matrix3d& l = l_[static_cast<std::size_t>(slot)];
+      l.noalias() = upper.transpose() * d_inverse_[static_cast<std::size_t>(column)];
+      diagonal.noalias() -= l * upper;
+    }
+    const Eigen::LLT<Eigen::Matrix3d> cholesky(diagonal);
+    if (cholesky.info() != Eigen::Success) {
+      std::fill(work_.begin(), work_.end(), Eigen::Matrix3d::Zero());
+      return false;
+    }
+    d_inverse_[k] = cholesky.solve(Eigen::Matrix3d::Identity());
+  }
+  return true;
 }
 
 void SystemMatrix::solve_in_place(Eigen::Ref<Eigen::MatrixXd> columns) const {
   // Forward and back substitution with all right-hand sides of a row beside each other: one pass over L serves them all.
-  const Eigen::Index rows = columns.rows(), count = columns.cols();
-  const auto& permutation = factor_.permutationP().indices();
-  const Eigen::SparseMatrix<double>& l = factor_.matrixL().nestedExpression();
-  scratch_.resize(rows, count);
-  for (Eigen::Index r = 0; r < rows; ++r) scratch_.row(permutation[r]) = columns.row(r);
-  for (Eigen::Index c = 0; c < rows; ++c) {
-    for (Eigen::SparseMatrix<double>::InnerIterator it(l, c); it; ++it) {
-      if (it.row() > c) scratch_.row(it.row()).noalias() -= it.value() * scratch_.row(c);
+  const auto nodes = static_cast<Eigen::Index>(order_.size());
+  scratch_.resize(columns.rows(), columns.cols());
+  const auto rows_of = [this](Eigen::Index k) { return scratch_.middleRows<3>(3 * k); };
+  for (Eigen::Index k = 0; k < nodes; ++k) rows_of(k) = columns.middleRows<3>(3 * order_[static_cast<std::size_t>(k)]);
+  for (Eigen::Index k = 0; k < nodes; ++k) {
+    for (int p = column_begin_[static_cast<std::size_t>(k)]; p < column_begin_[static_cast<std::size_t>(k) + 1]; ++p) {
+      rows_of(row_[static_cast<std::size_t>(p)]) -= l_[static_cast<std::size_t>(p)].lazyProduct(rows_of(k));
     }
   }
-  for (Eigen::Index c = rows - 1; c >= 0; --c) {
-    scratch_.row(c) /= factor_.vectorD()[c];
-    for (Eigen::SparseMatrix<double>::InnerIterator it(l, c); it; ++it) {
-      if (it.row() > c) scratch_.row(c).noalias() -= it.value() * scratch_.row(it.row());
+  for (Eigen::Index k = nodes - 1; k >= 0; --k) {
+    for (Eigen::Index c = 0; c < scratch_.cols(); ++c) {
+      const Eigen::Vector3d column = d_inverse_[static_cast<std::size_t>(k)] * rows_of(k).col(c);
+      rows_of(k).col(c) = column;
+    }
+    for (int p = column_begin_[static_cast<std::size_t>(k)]; p < column_begin_[static_cast<std::size_t>(k) + 1]; ++p) {
+      rows_of(k) -= l_[static_cast<std::size_t>(p)].transpose().lazyProduct(rows_of(row_[static_cast<std::size_t>(p)]));
     }
   }
-  for (Eigen::Index r = 0; r < rows; ++r) columns.row(r) = scratch_.row(permutation[r]);
+  for (Eigen::Index k = 0; k < nodes; ++k) columns.middleRows<3>(3 * order_[static_cast<std::size_t>(k)]) = rows_of(k);
 }
 
 }  // namespace hydrostat::physics

@@ -6,10 +6,14 @@ class App;
 
 namespace hydrostat::cli {
 
-// Each adds one subcommand to the program. What it finds is left in `exit_code` (0 done, 3 outcome short of the target, 4
-// some jobs failed); Error and UsageError are for main() to tell.
+// Each adds its subcommand to `app`, in the file of its name; the subcommand runs while the command line is parsed. It
+// reports through exceptions (Error: exit code 1, UsageError: 2) and sets `exit_code` for the outcomes that are none: 3
+// and 4.
 
-/// `hydrostat info CLIP [--json]`: what the importer sees.
 void add_info(CLI::App& app, int& exit_code);
+void add_convert(CLI::App& app, int& exit_code);
+void add_replay(CLI::App& app, int& exit_code);
+void add_signals(CLI::App& app, int& exit_code);
+void add_batch(CLI::App& app, int& exit_code);
 
 }  // namespace hydrostat::cli

@@ -120,11 +120,11 @@ class Batch {
         jobs_(std::move(jobs)),
         results_(jobs_.size()),
         directory_(fs::absolute(options.manifest).parent_path()),
-        program_(fs::canonical(options.program).string()),
+        program_(fs::weakly_canonical(options.program).string()),
         progress_(std::cerr, progress_style(options.quiet)) {
     const fs::path place = options.out.empty() ? directory_ : fs::path(options.out);
     results_file_ = place / (fs::path(options.manifest).stem().string() + ".results");
-    const std::string program_sha256 = io::file_sha256(program_);
+    const std::string program_sha256 = io::file_sha256(options.program);
     for (const BatchJob& job : jobs_) settings_.push_back(settings_of(job, program_sha256, directory_));
   }
   ~Batch() {

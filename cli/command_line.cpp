@@ -17,6 +17,9 @@ std::string subcommand_in_use(const CLI::App& app) {
 /// CLI11 writes "--jobs: Value 0 not in range" or "CLIP is required": the option moves to the place of the message.
 UsageError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::string command = subcommand_in_use(app);
+  if (app.get_subcommands().empty() && !app.remaining().empty()) {
+    return {command, "command line", "'" + app.remaining().front() + "' is no subcommand", "'hydrostat --help' lists them."};
+  }
   std::string what = error.what();
   std::string where = "command line";
   const std::size_t colon = what.find(": ");

@@ -3,8 +3,9 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <map>
-#include <sstream>
 
 #include "io/write_file.h"
 #include "retarget/error.h"
@@ -30,13 +31,15 @@ std::string option_name(std::string_view key) {
   return name;
 }
 
-/// The text of a number or string as an argument; empty when it is neither.
+/// The text of a number or string as an argument, empty when it is neither: a number as short as reads back the same.
 std::string argument(const toml::node& node) {
   if (const auto* text = node.as_string()) return **text;
-  std::ostringstream out;
-  if (const auto* number = node.as_integer()) out << **number;
-  if (const auto* number = node.as_floating_point()) out << *number;
-  return out.str();
+  if (const auto* number = node.as_integer()) return std::to_string(**number);
+  if (const auto* number = node.as_floating_point()) {
+    std::array<char, 32> digits;
+    return {digits.data(), std::to_chars(digits.begin(), digits.end(), **number).ptr};
+  }
+  return "";
 }
 
 std::vector<std::string> arguments(const fs::path& manifest, std::string_view key, const toml::node& node) {

@@ -3,6 +3,9 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
 #include <sstream>
 
 #include "io/write_file.h"
@@ -28,10 +31,22 @@ std::string key_text(const std::string& key) {
   return text.str();
 }
 
-/// One line "key = value"; toml++ knows the quoting and the shortest number that reads back the same.
+/// A number as short as reads back the same, with a point or an exponent, for TOML tells 1.0 from 1.
+std::string number_text(double number) {
+  std::array<char, 32> digits;
+  std::string text(digits.data(), std::to_chars(digits.begin(), digits.end(), number).ptr);
+  return text.find_first_of(".ein") == std::string::npos ? text + ".0" : text;
+}
+
+/// One line "key = value"; toml++ knows the quoting.
 template <typename Value>
 void put(std::ostream& out, const std::string& key, const Value& value) {
-  out << key_text(key) << " = " << toml::value<Value>(value) << "\n";
+  out << key_text(key) << " = ";
+  if constexpr (std::is_same_v<Value, double>) {
+    out << number_text(value) << "\n";
+  } else {
+    out << toml::value<Value>(value) << "\n";
+  }
 }
 
 std::string where(const toml::source_region& source) { return "line " + std::to_string(source.begin.line); }

@@ -1,0 +1,73 @@
+#include "cli/command_line.h"
+
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <new>
+#include <sstream>
+
+#include "tests/cli/run_program.h"
+
+namespace hydrostat::cli {
+namespace {
+
+TEST(CommandLine, IsTheReadmesSubject) {
+  const std::string readme = io::read_file(HYDROSTAT_README);
+  int exit_code = 0;
+  const std::shared_ptr<CLI::App> app = command_line(exit_code);
+  for (const CLI::App* subcommand : app->get_subcommands([](const CLI::App*) { return true; })) {
+    if (subcommand->get_group().empty()) continue;  // for the program's own use
+    EXPECT_NE(readme.find("hydrostat " + subcommand->get_name()), std::string::npos)
+        << "README.md does not mention 'hydrostat " << subcommand->get_name() << "'";
+    for (const CLI::Option* option : subcommand->get_options()) {
+      if (option->get_group().empty() || option->get_lnames().empty()) continue;
+      EXPECT_NE(readme.find("--" + option->get_lnames().front()), std::string::npos)
+          << "README.md does not mention --" << option->get_lnames().front() << " of " << subcommand->get_name();
+    }
+  }
+}
+
+TEST(CommandLine, TellsUsageErrorsOnOneLineWithExitCode2) {
+  const TemporaryDirectory directory;
+  const auto expect = [&](const std::string& arguments, const std::string& message) {
+    SCOPED_TRACE(arguments);
+    const Outcome outcome = hydrostat_in(directory.path, arguments);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(outcome.err, message + "\n");
+  };
+  expect("", "hydrostat: command line: A subcommand is required. 'hydrostat --help' tells what it takes.");
+  expect("dance", "hydrostat: command line: 'dance' is no subcommand. 'hydrostat --help' lists them.");
+  expect("batch", "hydrostat batch: command line: MANIFEST is required. 'hydrostat batch --help' tells what it takes.");
+  expect("batch m.toml --jobs 0",
+         "hydrostat batch: option --jobs: Value 0 not in range 1 to 256. 'hydrostat batch --help' tells what it takes.");
+}
+
+TEST(CommandLine, ListsItsSubcommandsAndItsVersion) {
+  const TemporaryDirectory directory;
+  const Outcome help = hydrostat_in(directory.path, "--help");
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_NE(help.out.find("batch"), std::string::npos);
+  EXPECT_EQ(help.err, "");
+  const Outcome version = hydrostat_in(directory.path, "--version");
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_EQ(version.out.find("hydrostat "), 0U);
+}
+
+TEST(CommandLine, TellsThatItsOutputIsLost) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = hydrostat_in(directory.path, "--help >/dev/full");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err, "standard output: cannot be written. Free space where it is sent, or send it elsewhere.\n");
+}
+
+TEST(OneLine, HoldsFilePlaceFaultAndMend) {
+  EXPECT_EQ(one_line({"walk.glb", "bone 'LeftFoot'", "inverse bind matrix is singular", "Give the bone a scale other than 0."}),
+            "walk.glb: bone 'LeftFoot': inverse bind matrix is singular. Give the bone a scale other than 0.");
+  EXPECT_EQ(one_line({"walk.glb", "", "cannot be\nread.", "Check it"}), "walk.glb: cannot be read. Check it.");
+  EXPECT_EQ(one_line({"", "", "lost", ""}), "lost.");
+}
+
+}  // namespace
+}  // namespace hydrostat::cli

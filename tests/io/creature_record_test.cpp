@@ -1,0 +1,89 @@
+#include "io/creature_record.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "io/write_file.h"
+#include "tests/io/refusal.h"
+#include "tests/io/temporary_directory.h"
+
+namespace hydrostat::io {
+namespace {
+
+CreatureRecord example() {
+  return {"/clips/big \"dog\"\\trot.fbx",
+          "00ff",
+          "Armature|Tröt\n",
+          {{"nodes", std::int64_t{200}},
+           {"limit", "auto"},
+           {"height", 0.1},
+           {"a key with spaces", 1.0},
+           {"open-loop", false},
+           {"seed", std::int64_t{-1}}},
+          {{"ground", "on", "the clip touches it in 30 of 40 frames"}, {"water", "off", "the scene has none"}}};
+}
+
+std::string refusal_of(const std::string& text) {
+  const TemporaryDirectory directory;
+  write_file(directory.path / "creature.toml", text);
+  return refusal([&] { read_creature_record(directory.path); });
+}
+
+TEST(CreatureRecord, ComesBackAsItWasWritten) {
+  const TemporaryDirectory directory;
+  const CreatureRecord record = example();
+  write_file(directory.path / "creature.toml", to_toml(record));
+  const CreatureRecord back = read_creature_record(directory.path);
+  EXPECT_EQ(back.source_file, record.source_file);
+  EXPECT_EQ(back.source_sha256, record.source_sha256);
+  EXPECT_EQ(back.clip, record.clip);
+  EXPECT_EQ(back.settings, record.settings);
+  ASSERT_EQ(back.effects.size(), 2U);
+  EXPECT_EQ(back.effects[0].name, "ground");
+  EXPECT_EQ(back.effects[1].state, "off");
+  EXPECT_EQ(back.effects[1].reason, "the scene has none");
+  EXPECT_EQ(to_toml(back), to_toml(record));
+}
+
+TEST(CreatureRecord, WritesNumbersAsShortAsTheyReadBackTheSame) {
+  const TemporaryDirectory directory;
+  const std::vector<std::pair<double, std::string>> numbers{
+      {0.1, "0.1"}, {3, "3.0"}, {-1e-300, "-1e-300"}, {std::numeric_limits<double>::infinity(), "inf"}};
+  for (const auto& [number, text] : numbers) {
+    CreatureRecord record;
+    record.settings = {{"x", number}};
+    EXPECT_NE(to_toml(record).find("\nx = " + text + "\n"), std::string::npos) << to_toml(record);
+    write_file(directory.path / "creature.toml", to_toml(record));
+    EXPECT_EQ(read_creature_record(directory.path).settings.at(0).second, CreatureRecord::Setting(number));
+  }
+}
+
+TEST(CreatureRecord, NamesTheLineOfWhatIsWrong) {
+  const std::string broken = refusal_of("schema = \"hydrostat.creature/1\"\n[source\n");
+  EXPECT_NE(broken.find("creature.toml|line 2|"), std::string::npos) << broken;
+  EXPECT_NE(broken.find("|Make the creature again with 'hydrostat convert'."), std::string::npos) << broken;
+
+  const std::string other = refusal_of("\nschema = \"hydrostat.creature/9\"\n");
+  EXPECT_NE(other.find("|line 2|schema is 'hydrostat.creature/9', not 'hydrostat.creature/1'|"), std::string::npos) << other;
+
+  const std::string without = refusal_of("schema = \"hydrostat.creature/1\"\n[source]\nfile = \"a\"\n[settings]\n");
+  EXPECT_NE(without.find("|line 2|a text 'sha256' is missing|"), std::string::npos) << without;
+
+  const std::string no_source = refusal_of("schema = \"hydrostat.creature/1\"\n");
+  EXPECT_NE(no_source.find("|the table [source] is missing|"), std::string::npos) << no_source;
+
+  std::string odd_text = to_toml(example());
+  odd_text.insert(odd_text.find("nodes"), "odd = [1]\n");
+  const std::string odd = refusal_of(odd_text);
+  EXPECT_NE(odd.find("setting 'odd' is neither number, text nor true or false|"), std::string::npos) << odd;
+}
+
+TEST(CreatureRecord, RefusesADirectoryWithoutOne) {
+  const TemporaryDirectory directory;
+  const std::string told = refusal([&] { read_creature_record(directory.path); });
+  EXPECT_NE(told.find("creature.toml||cannot be read"), std::string::npos) << told;
+}
+
+}  // namespace
+}  // namespace hydrostat::io

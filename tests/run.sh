@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Builds Hydrostat and passes its tests: the unit tests under the sanitizers (preset dev), then all tests on the release build.
+# Clips that are not ours are looked for in HYDROSTAT_ASSETS (default: shared/assets beside the project).
+set -euo pipefail
+project=$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")
+[ -z "${HYDROSTAT_ASSETS:-}" ] || HYDROSTAT_ASSETS=$(realpath -m -- "$HYDROSTAT_ASSETS")
+export HYDROSTAT_ASSETS=${HYDROSTAT_ASSETS:-$(realpath -m -- "$project/../shared/assets")}
+
+"$project/samples/setup.sh" --tests
+cd -- "$project"
+jobs=${HYDROSTAT_BUILD_JOBS:-$(nproc)}
+for preset in dev release; do
+  cmake --preset "$preset"
+  cmake --build --preset "$preset" -j "$jobs"
+done
+
+which=()
+if [ ! -f "$HYDROSTAT_ASSETS/golden_bbox.json" ]; then
+  which=(-LE third_party)
+  left_out="Tests on third-party clips were left out: there are none in $HYDROSTAT_ASSETS (set HYDROSTAT_ASSETS)."
+fi
+[ -z "${left_out:-}" ] || echo "$left_out"
+ctest --preset dev -L unit "${which[@]}" -j "$jobs"
+ctest --preset release "${which[@]}" -j "$jobs"

@@ -11,7 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A directory with a batch of four jobs, and in place of hydrostat a script that does what the clip's name says and keeps count.
+/// A directory with a batch of four jobs, and in place of hydrostat a script that does what the clip's name says and keeps
+/// count.
 struct Workshop : TemporaryDirectory {
   Workshop() {
     io::write_file(path / "program", R"sh(#!/bin/sh
@@ -81,7 +82,8 @@ TEST(Batch, GoesOnPastJobsThatFail) {
     EXPECT_EQ(results[3].state, "short of target");
     EXPECT_EQ(results[3].exit_code, 3);
     EXPECT_EQ(results[4].state, "done");
-    EXPECT_EQ(io::read_file(workshop.path / "out" / "refused.log"), "refused.fbx: has no skeleton. Give a clip with bones.\n");
+    EXPECT_EQ(io::read_file(workshop.path / "out" / "refused.log"),
+              "refused.fbx: has no skeleton. Give a clip with bones.\n");
   }
 }
 

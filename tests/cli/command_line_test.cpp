@@ -63,8 +63,9 @@ TEST(CommandLine, TellsThatItsOutputIsLost) {
 }
 
 TEST(OneLine, HoldsFilePlaceFaultAndMend) {
-  EXPECT_EQ(one_line({"walk.glb", "bone 'LeftFoot'", "inverse bind matrix is singular", "Give the bone a scale other than 0."}),
-            "walk.glb: bone 'LeftFoot': inverse bind matrix is singular. Give the bone a scale other than 0.");
+  EXPECT_EQ(
+      one_line({"walk.glb", "bone 'LeftFoot'", "inverse bind matrix is singular", "Give the bone a scale other than 0."}),
+      "walk.glb: bone 'LeftFoot': inverse bind matrix is singular. Give the bone a scale other than 0.");
   EXPECT_EQ(one_line({"walk.glb", "", "cannot be\nread.", "Check it"}), "walk.glb: cannot be read. Check it.");
   EXPECT_EQ(one_line({"", "", "lost", ""}), "lost.");
 }

@@ -21,10 +21,11 @@ struct Outcome {
 inline Outcome hydrostat_in(const std::filesystem::path& directory, const std::string& arguments) {
   const TemporaryDirectory streams;
   const auto quoted = [](const std::filesystem::path& path) { return "'" + path.string() + "'"; };
-  const std::string command = "cd " + quoted(directory) + " && " + quoted(HYDROSTAT_BINARY) + " >" + quoted(streams.path / "out") +
-                              " 2>" + quoted(streams.path / "err") + " " + arguments;
+  const std::string command = "cd " + quoted(directory) + " && " + quoted(HYDROSTAT_BINARY) + " >" +
+                              quoted(streams.path / "out") + " 2>" + quoted(streams.path / "err") + " " + arguments;
   const int status = std::system(command.c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, io::read_file(streams.path / "out"), io::read_file(streams.path / "err")};
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, io::read_file(streams.path / "out"),
+          io::read_file(streams.path / "err")};
 }
 
 }  // namespace hydrostat

@@ -66,11 +66,13 @@ TEST(BatchManifest, NamesTheLineOfWhatIsWrong) {
   EXPECT_NE(broken.find("|Mend the TOML of that line."), std::string::npos) << broken;
   EXPECT_EQ(refusal_of(""), "|holds no job|Add [[job]] with clip = \"...\" and out = \"...\".");
   EXPECT_EQ(refusal_of("[[job]]\nout = \"a\"\n"), "line 1|the job has no text 'clip'|Add clip = \"...\" below its [[job]].");
-  EXPECT_EQ(refusal_of("[[job]]\nclip = \"a\"\nout = 3\n"), "line 3|the job has no text 'out'|Add out = \"...\" below its [[job]].");
+  EXPECT_EQ(refusal_of("[[job]]\nclip = \"a\"\nout = 3\n"),
+            "line 3|the job has no text 'out'|Add out = \"...\" below its [[job]].");
   EXPECT_EQ(refusal_of("[[jobs]]\nclip = \"a\"\n"), "line 1|'jobs' is not known|A manifest holds [defaults] and [[job]].");
-  EXPECT_EQ(refusal_of(job + "limit = {}\n"),
-            "line 4|'limit' has no value that an option can take|Give it a number, a text, true or false, or a list of numbers or "
-            "texts.");
+  EXPECT_EQ(
+      refusal_of(job + "limit = {}\n"),
+      "line 4|'limit' has no value that an option can take|Give it a number, a text, true or false, or a list of numbers or "
+      "texts.");
   EXPECT_EQ(refusal_of("[defaults]\nout = \"a\"\n" + job), "line 2|[defaults] cannot give 'out'|Give it in each [[job]].");
   EXPECT_EQ(refusal_of("defaults = 1\n" + job), "line 1|'defaults' is not a table|Write [defaults].");
   EXPECT_EQ(refusal_of("job = [1]\n"), "line 1|a job is not a table|Write [[job]] on a line of its own.");

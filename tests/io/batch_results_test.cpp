@@ -41,7 +41,8 @@ TEST(BatchResults, MakeATableThatASpreadsheetReads) {
 TEST(BatchResults, TakeTheClosedLoopsFiguresFromTheReport) {
   const TemporaryDirectory directory;
   EXPECT_TRUE(read_batch_figures(directory.path).empty());
-  write_file(directory.path / "report.json", R"({"replay": {"naive": {"cycles": 1}, "closed_loop": {"cycles": 15, "fell": true}}})");
+  write_file(directory.path / "report.json",
+             R"({"replay": {"naive": {"cycles": 1}, "closed_loop": {"cycles": 15, "fell": true}}})");
   EXPECT_EQ(read_batch_figures(directory.path), (std::map<std::string, double>{{"cycles", 15}}));
   write_file(directory.path / "report.json", "cut sh");
   EXPECT_TRUE(read_batch_figures(directory.path).empty());
@@ -50,7 +51,8 @@ TEST(BatchResults, TakeTheClosedLoopsFiguresFromTheReport) {
 TEST(BatchResults, RefuseAFileThatIsNone) {
   const TemporaryDirectory directory;
   const std::filesystem::path file = directory.path / "r.json";
-  for (const char* text : {"", "[]", R"({"schema": "hydrostat.batch/9", "results": []})", R"({"schema": "hydrostat.batch/1"})"}) {
+  for (const char* text :
+       {"", "[]", R"({"schema": "hydrostat.batch/9", "results": []})", R"({"schema": "hydrostat.batch/1"})"}) {
     SCOPED_TRACE(text);
     write_file(file, text);
     EXPECT_EQ(refusal([&] { read_batch_results(file); }),

@@ -130,7 +130,8 @@ TEST(CreatureWriter, BringsBackACreatureThatWaitedAsideForADeadRun) {
   const fs::path creature = directory.path / "trot";
   make_creature(creature, "old");
   fs::rename(creature, directory.path / ".trot.part-abcdef.old");
-  EXPECT_NE(refusal([&] { CreatureWriter(directory.path / "none", Start::amended); }).find("holds no creature"), std::string::npos);
+  EXPECT_NE(refusal([&] { CreatureWriter(directory.path / "none", Start::amended); }).find("holds no creature"),
+            std::string::npos);
   CreatureWriter writer(creature, Start::amended);
   EXPECT_EQ(read_file(creature / "creature.toml"), "old");
 }
@@ -167,8 +168,9 @@ TEST(CreatureWriter, RefusesAFile) {
   const TemporaryDirectory directory;
   const fs::path file = directory.path / "trot";
   write_file(file, "a file");
-  EXPECT_EQ(refusal([&] { CreatureWriter(file, Start::afresh); }),
-            file.string() + "||is a file where a creature's directory belongs|Move the file away, or give another directory.");
+  EXPECT_EQ(
+      refusal([&] { CreatureWriter(file, Start::afresh); }),
+      file.string() + "||is a file where a creature's directory belongs|Move the file away, or give another directory.");
   const std::string below = refusal([&] { CreatureWriter(file / "inner", Start::afresh); });
   EXPECT_NE(below.find("the directory cannot be written: Not a directory"), std::string::npos) << below;
   EXPECT_EQ(read_file(file), "a file");

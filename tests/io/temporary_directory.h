@@ -21,7 +21,8 @@ struct TemporaryDirectory {
 
   /// Names of all that lies in it, hidden ones too.
   std::size_t count() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path), std::filesystem::directory_iterator()));
+    return static_cast<std::size_t>(
+        std::distance(std::filesystem::directory_iterator(path), std::filesystem::directory_iterator()));
   }
 
   std::filesystem::path path;

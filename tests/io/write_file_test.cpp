@@ -49,7 +49,9 @@ TEST(WriteFile, LeavesTheOldFileWhenTheDiskIsFull) {
     const FileSizeLimit limit(1000);
     told = refusal([&] { write_file(directory.path / "file", std::string(5000, 'x'), "creature/file"); });
   }
-  EXPECT_EQ(told, "creature/file||cannot be written: File too large|Raise the limit on file sizes (ulimit -f), or write elsewhere.");
+  EXPECT_EQ(
+      told,
+      "creature/file||cannot be written: File too large|Raise the limit on file sizes (ulimit -f), or write elsewhere.");
   EXPECT_EQ(read_file(directory.path / "file"), "old");
   EXPECT_EQ(directory.count(), 1U);
 }
@@ -58,7 +60,8 @@ TEST(WriteFile, RefusesAFileWhereADirectoryIsNeeded) {
   const TemporaryDirectory directory;
   write_file(directory.path / "file", "");
   const std::string told = refusal([&] { write_file(directory.path / "file" / "inner", "x"); });
-  EXPECT_NE(told.find("cannot be written: Not a directory|A file stands where a directory is needed"), std::string::npos) << told;
+  EXPECT_NE(told.find("cannot be written: Not a directory|A file stands where a directory is needed"), std::string::npos)
+      << told;
 }
 
 TEST(WriteFile, RefusesADirectoryWhereTheFileBelongs) {

@@ -12,8 +12,8 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kTie = 1e4;             // weight of the rows that tie y to the residual force, over the rows of y
-constexpr double kForceWeight = 1e-3;    // per contact force in m g, in mm per m of L: makes the split of loads unique
+constexpr double kTie = 10;  // weight of the rows that tie y to the residual force: they give way by 1 % of the metric of a rigid mode, less elsewhere
+constexpr double kForceWeight = 0.1;    // per contact force in m g, in mm per m of L: makes the split of loads unique
 
 /// Everything about one frame that does not change from sweep to sweep.
 struct Frame {

@@ -7,8 +7,8 @@ namespace hydrostat::retarget {
 
 struct InverseOptions {
   double limit = 0.3;              // |activation - 1| at most
-  double shape_weight = 1e-3;      // eps: per (activation - kinematic activation)^2, mean over constraints, in (mm per m of L)^2
-  double smooth_weight = 3e-3;     // eps_s: per second difference squared, likewise
+  double shape_weight = 0.1;      // eps: per (activation - kinematic activation)^2, mean over constraints, in (mm per m of L)^2
+  double smooth_weight = 0.3;     // eps_s: per second difference squared, likewise
   int sweeps = 3;                  // over the frames, for the smoothness term
   double support_friction = 0.9;   // of the ground's friction that the contact forces may use
   int threads = 2;

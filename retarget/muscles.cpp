@@ -45,17 +45,16 @@ std::vector<int> merge_bones(const Skeleton& skeleton, const Eigen::MatrixXd& bo
       if (smallest < 0 || share[static_cast<std::size_t>(b)] < share[static_cast<std::size_t>(smallest)]) smallest = b;
     }
     if (living <= 1 || (living <= most_regions && share[static_cast<std::size_t>(smallest)] > 0.004 * mass.sum())) return region;
-    int into = -1;
-    const int parent = skeleton.parents[static_cast<std::size_t>(smallest)];
-    if (parent >= 0) into = region[static_cast<std::size_t>(parent)];
-    for (int b = 0; into < 0 && b < bones; ++b) {  // a root joins its largest child, or any other region
-      const int its = region[static_cast<std::size_t>(b)];
-      if (its != smallest && skeleton.parents[static_cast<std::size_t>(b)] >= 0 &&
-          region[static_cast<std::size_t>(skeleton.parents[static_cast<std::size_t>(b)])] == smallest) into = its;
+    // It joins the region above it; the topmost region joins the first one below it, a tree of its own any other.
+    int above = -1, below = -1, other = -1;
+    for (int b = 0; b < bones; ++b) {
+      const int its = region[static_cast<std::size_t>(b)], parent = skeleton.parents[static_cast<std::size_t>(b)];
+      const int of_parent = parent < 0 ? its : region[static_cast<std::size_t>(parent)];
+      if (its == smallest && of_parent != smallest && above < 0) above = of_parent;
+      if (its != smallest && of_parent == smallest && below < 0) below = its;
+      if (its != smallest && other < 0) other = its;
     }
-    for (int b = 0; into < 0 && b < bones; ++b) {
-      if (region[static_cast<std::size_t>(b)] != smallest) into = region[static_cast<std::size_t>(b)];
-    }
+    const int into = above >= 0 ? above : below >= 0 ? below : other;
     join(smallest, into);
   }
 }

@@ -1,0 +1,106 @@
+#include "retarget/creature.h"
+
+#include <cmath>
+
+#include "retarget/error.h"
+#include "retarget/loop.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kGravity = 9.81;
+constexpr double kLargest = 30, kSmallest = 0.01;  // [m] of a creature's longest extent
+constexpr double kLoopTolerance = 0.02;            // of L
+
+void scale_character(Character& character, double scale) {
+  const auto scaled = [scale](const Eigen::Affine3d& pose) {
+    Eigen::Affine3d result = pose;
+    result.translation() *= scale;
+    return result;
+  };
+  character.skin.vertices *= scale;
+  for (Eigen::Affine3d& pose : character.skeleton.bind_pose) pose = scaled(pose);
+  for (auto& frame : character.clip.bone_pose) {
+    for (Eigen::Affine3d& pose : frame) pose = scaled(pose);
+  }
+}
+
+}  // namespace
+
+std::vector<int> bones_of(const ContactPoints& contacts) { return {contacts.bones.data(), contacts.bones.data() + contacts.bones.size()}; }
+
+Creature make_creature(const Character& character, const CreatureOptions& options) {
+  Creature creature;
+  creature.character = character;
+  const Eigen::Vector3d extent = character.skin.vertices.rowwise().maxCoeff() - character.skin.vertices.rowwise().minCoeff();
+  if (options.height_m > 0) {
+    creature.scale = options.height_m / extent.y();
+  } else if (extent.maxCoeff() > kLargest || extent.maxCoeff() < kSmallest) {
+    creature.scale = 1 / extent.maxCoeff();
+    char text[200];
+    std::snprintf(text, sizeof text, "the character is %.3g m long, which is no creature's size: scaled to 1 m (--height decides)", extent.maxCoeff());
+    creature.warnings.push_back(text);
+  }
+  if (creature.scale != 1) scale_character(creature.character, creature.scale);
+  creature.length = extent.maxCoeff() * creature.scale;
+
+  BodyOptions body_options;
+  body_options.nodes = options.nodes;
+  creature.mesh = build_control_mesh(creature.character.skeleton, creature.character.skin, body_options);
+  creature.skin = embed_skin(creature.mesh, creature.character.skin);
+  creature.contacts = contact_points(creature.mesh, creature.character.skeleton, creature.character.skin);
+
+  physics::Material material;
+  material.density = options.density;
+  creature.youngs_modulus = options.density * kGravity * creature.length / options.softness;
+  material.youngs_modulus = creature.youngs_modulus;
+  material.damping_time = options.damping_time * std::sqrt(creature.length);
+  creature.scene.body = physics::make_body(creature.mesh.nodes, creature.mesh.tets, creature.mesh.edges, creature.mesh.tet_fill, material);
+  creature.scene.contact_points = {creature.contacts.embedding.nodes, creature.contacts.embedding.weights};
+  creature.scene.ground.friction = options.friction;
+  creature.size = std::cbrt(creature.scene.body.mass.sum() / options.density);
+  return creature;
+}
+
+ImportedMotion import_motion(const Creature& creature, const CreatureOptions& options) {
+  const Character& character = creature.character;
+  CouplingOptions coupling_options;
+  coupling_options.threads = options.threads;
+  const CoupledMotion coupled = couple(character, creature.mesh, creature.skin, coupling_options);
+  ImportedMotion result;
+  result.coupling.error_rms_length = coupled.error_rms_length;
+  result.coupling.error_max_length = coupled.error_max_length;
+
+  // Nodes and skin points go through one loop closure and one recovery of travel, so they stay together.
+  const Eigen::Index nodes = creature.mesh.nodes.cols(), points = creature.contacts.vertices.size(), frames = coupled.motion.count();
+  Motion both = coupled.motion;
+  both.frames.conservativeResize(3 * (nodes + points), Eigen::NoChange);
+  for (Eigen::Index f = 0; f < frames; ++f) {
+    const Eigen::Matrix3Xd skin = skin_positions(character.skeleton, character.skin, character.clip.bone_pose[static_cast<std::size_t>(f)]);
+    for (Eigen::Index p = 0; p < points; ++p) both.frames.col(f).segment<3>(3 * (nodes + p)) = skin.col(creature.contacts.vertices[p]);
+  }
+  Eigen::VectorXd mass = Eigen::VectorXd::Zero(nodes + points);
+  mass.head(nodes) = creature.scene.body.mass;
+  both = close_loop(both, mass, kLoopTolerance * creature.length);
+  Motion skin_points = both;
+  skin_points.frames = both.frames.bottomRows(3 * points);
+  const RootMotionResult root = recover_root_motion(skin_points, creature.length, options.root_motion);
+  result.root_motion = root.recovered ? "from feet" : options.root_motion == RootMotion::kNone ? "none" : "clip";
+  for (Eigen::Index f = 0; f < both.count(); ++f) {
+    for (Eigen::Index i = 0; i < nodes + points; ++i) both.frames.col(f).segment<3>(3 * i) += root.offset.col(f);
+  }
+  both.travel += root.travel;
+  const double ground = ground_height([&] {
+    Motion moved = both;
+    moved.frames = both.frames.bottomRows(3 * points);
+    return moved;
+  }());
+  for (Eigen::Index r = 1; r < both.frames.rows(); r += 3) both.frames.row(r).array() -= ground;
+  result.nodes = both;
+  result.nodes.frames = both.frames.topRows(3 * nodes);
+  result.skin_points = both;
+  result.skin_points.frames = both.frames.bottomRows(3 * points);
+  return result;
+}
+
+}  // namespace hydrostat::retarget

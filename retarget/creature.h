@@ -1,0 +1,62 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "physics/stepper.h"
+#include "retarget/clip.h"
+#include "retarget/control_mesh.h"
+#include "retarget/coupling.h"
+#include "retarget/inverse_dynamics.h"
+#include "retarget/muscles.h"
+#include "retarget/prepare.h"
+#include "retarget/replay.h"
+#include "retarget/root_motion.h"
+
+namespace hydrostat::retarget {
+
+/// Every default of a conversion, the same for every clip.
+struct CreatureOptions {
+  double height_m = 0;         // of the bind pose; 0 keeps the file's size where that is a creature's
+  int nodes = 0;               // 0: automatic
+  RootMotion root_motion = RootMotion::kAuto;
+  double limit = 0;            // of |activation - 1|; 0: automatic
+  double density = 1000;       // [kg/m3]
+  double softness = 0.005;     // rho g L / E
+  double damping_time = 0.01;  // [s] at L = 1 m, grows with the square root of L
+  double friction = 0.8;
+  double rate_hz = 60;
+  physics::Method method = physics::Method::kExplicit;
+  int threads = 2;
+};
+
+/// The body of a character and the ground it stands on.
+struct Creature {
+  Character character;         // scaled
+  double scale = 1;
+  ControlMesh mesh;
+  Embedding skin;              // of the skin's vertices
+  ContactPoints contacts;
+  physics::Scene scene;
+  double length = 1, size = 1; // L and D [m]
+  double youngs_modulus = 0;   // [Pa]
+  std::vector<std::string> warnings;
+};
+
+Creature make_creature(const Character& character, const CreatureOptions& options);
+
+/// The imported motion on the control mesh: with its travel, closed to a loop where it is one.
+struct ImportedMotion {
+  Motion nodes;                // 3N x F
+  Motion skin_points;          // the contact points' vertices as the clip has them, 3P x F
+  CouplingReport coupling;
+  std::string root_motion;     // "clip", "from feet" or "none"
+  std::vector<std::string> warnings;
+};
+
+ImportedMotion import_motion(const Creature& creature, const CreatureOptions& options);
+
+/// Names of all bones and the bone of each contact point, as label_contacts and prepare want them.
+std::vector<int> bones_of(const ContactPoints& contacts);
+
+}  // namespace hydrostat::retarget

@@ -49,7 +49,8 @@ class Steppers : public testing::TestWithParam<Method> {
  protected:
   /// Runs `steps` and gives each to `look(before, after, impulses)`.
   template <typename Look>
-  State run(const Scene& scene, State state, int steps, const Look& look, double activation_amplitude = 0, unsigned seed = 0) {
+  State run(const Scene& scene, State state, int steps, const Look& look, double activation_amplitude = 0,
+            unsigned seed = 0) {
     std::mt19937 random(seed);
     const std::unique_ptr<Stepper> stepper = make_stepper(GetParam(), scene);
     Impulses impulses = make_impulses(scene);
@@ -85,7 +86,8 @@ TEST_P(Steppers, MoveTheCentreOfMassOnAParabolaInFreeFlightWhateverTheActivation
     const Body& body = scene.body;
     State start{body.rest, random_points(random, body.node_count(), 1)};
     const Eigen::Vector3d from = momentum(body, start.v) / body.mass.sum(), place = centre_of_mass(body, start.x);
-    const State end = run(scene, start, 240, [](const State&, const State&, const Impulses&) {}, 0.2, seed);
+    const State end = run(
+        scene, start, 240, [](const State&, const State&, const Impulses&) {}, 0.2, seed);
     EXPECT_LT((momentum(body, end.v) / body.mass.sum() - from - scene.gravity).norm(), 1e-9);
     // Semi-implicit steps of h fall g h t / 2 farther than the parabola.
     const double h = make_stepper(GetParam(), scene)->substep(kDt);
@@ -100,20 +102,22 @@ TEST_P(Steppers, BalanceMomentumWithTheBookedImpulsesInContact) {
   State start = laid_down(scene, 0.05);
   for (int i = 0; i < body.node_count(); ++i) start.v.col(i) = Eigen::Vector3d(0.7, 0, 0.3);
   double worst = 0, worst_moment = 0;
-  run(scene, start, 240, [&](const State& before, const State& after, const Impulses& impulses) {
-    const Eigen::Vector3d change = momentum(body, after.v) - momentum(body, before.v);
-    const Eigen::Vector3d contact = impulses.contact_nodes.rowwise().sum();
-    EXPECT_LT((contact - impulses.contact.rowwise().sum()).norm(), 1e-9);
-    worst = std::max(worst, (change - contact - kDt * body.mass.sum() * scene.gravity).norm() / (body.mass.sum() * kGravity * kDt));
-    const Eigen::Vector3d turned = angular_momentum(body, after.x, after.v, Eigen::Vector3d::Zero()) -
-                                   angular_momentum(body, before.x, before.v, Eigen::Vector3d::Zero());
-    const double scale = body.mass.sum() * kGravity * kDt;  // L is 1 m
-    worst_moment = std::max(worst_moment, (turned - impulses.contact_moment - impulses.gravity_moment).norm() / scale);
-  }, 0.1);
+  run(
+      scene, start, 240,
+      [&](const State& before, const State& after, const Impulses& impulses) {
+        const Eigen::Vector3d change = momentum(body, after.v) - momentum(body, before.v);
+        const Eigen::Vector3d contact = impulses.contact_nodes.rowwise().sum();
+        EXPECT_LT((contact - impulses.contact.rowwise().sum()).norm(), 1e-9);
+        worst = std::max(
+            worst, (change - contact - kDt * body.mass.sum() * scene.gravity).norm() / (body.mass.sum() * kGravity * kDt));
+        const Eigen::Vector3d turned = angular_momentum(body, after.x, after.v, Eigen::Vector3d::Zero()) -
+                                       angular_momentum(body, before.x, before.v, Eigen::Vector3d::Zero());
+        const double scale = body.mass.sum() * kGravity * kDt;  // L is 1 m
+        worst_moment = std::max(worst_moment, (turned - impulses.contact_moment - impulses.gravity_moment).norm() / scale);
+      },
+      0.1);
   EXPECT_LT(worst, 1e-6);
-  EXPECT_LT(worst_moment, GetParam() == Method::kExplicit ? 1e-9 : 2.0);  // mg L: backward Euler's own loss at touchdown
-  RecordProperty("angular_residual_mgl", std::to_string(worst_moment));
-  printf("%s angular %g linear %g\n", name_of(GetParam()).c_str(), worst_moment, worst);
+  EXPECT_LT(worst_moment, GetParam() == Method::kExplicit ? 1e-9 : 1.0);  // mg L: backward Euler's own loss at touchdown
 }
 
 TEST_P(Steppers, BookDeclaredEffectsAndNothingElse) {
@@ -148,19 +152,23 @@ TEST_P(Steppers, PushFromTheGroundInsideTheConeWhereItIsTouched) {
     for (int i = 0; i < scene.body.node_count(); ++i) start.v.col(i) = Eigen::Vector3d(1, -0.5, 0.5);
     const Eigen::Vector3d normal = scene.ground.normal;
     int pushes = 0;
-    run(scene, start, 240, [&](const State& before, const State& after, const Impulses& impulses) {
-      for (int p = 0; p < scene.contact_points.count(); ++p) {
-        const Eigen::Vector3d impulse = impulses.contact.col(p);
-        const double along = normal.dot(impulse);
-        EXPECT_GE(along, 0);
-        EXPECT_LE((impulse - along * normal).norm(), scene.ground.friction * along + 1e-12);
-        if (along == 0) continue;
-        ++pushes;
-        const double gap_before = normal.dot(scene.contact_points.of(before.x, p)), gap_after = normal.dot(scene.contact_points.of(after.x, p));
-        EXPECT_LT(std::min(gap_before, gap_after), 0.002 * size_of(scene.body));
-      }
-    }, 0.1, seed);
-    EXPECT_GT(pushes, 500);
+    run(
+        scene, start, 240,
+        [&](const State& before, const State& after, const Impulses& impulses) {
+          for (int p = 0; p < scene.contact_points.count(); ++p) {
+            const Eigen::Vector3d impulse = impulses.contact.col(p);
+            const double along = normal.dot(impulse);
+            EXPECT_GE(along, 0);
+            EXPECT_LE((impulse - along * normal).norm(), scene.ground.friction * along + 1e-12);
+            if (along == 0) continue;
+            ++pushes;
+            const double gap_before = normal.dot(scene.contact_points.of(before.x, p)),
+                         gap_after = normal.dot(scene.contact_points.of(after.x, p));
+            EXPECT_LT(std::min(gap_before, gap_after), 0.002 * size_of(scene.body));
+          }
+        },
+        0.1, seed);
+    EXPECT_GT(pushes, 200);
   }
 }
 
@@ -227,14 +235,14 @@ TEST_P(Steppers, LiftAPointThatStartsBelowTheGroundWithoutThrowingIt) {
   });
   EXPECT_LT(deepest(scene, end), 0.0005 * size_of(body));
   EXPECT_LT(end.v.norm(), 1e-3);
-  EXPECT_LT(fastest, GetParam() == Method::kExplicit ? 0.6 : 10);  // [m/s]
-  printf("%s lifted at %g\n", name_of(GetParam()).c_str(), fastest);
+  EXPECT_LT(fastest, GetParam() == Method::kExplicit ? 0.6 : 3);  // [m/s]; a spring gives back what the start put into it
 }
 
 TEST_P(Steppers, GiveTheSameBytesTwice) {
   const Scene scene = scene_of(four_legged(), soles(four_legged()), slope(10, 0.4));
   const auto nothing = [](const State&, const State&, const Impulses&) {};
-  const State one = run(scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7), two = run(scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7);
+  const State one = run(scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7),
+              two = run(scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7);
   EXPECT_EQ(std::memcmp(one.x.data(), two.x.data(), sizeof(double) * static_cast<std::size_t>(one.x.size())), 0);
   EXPECT_EQ(std::memcmp(one.v.data(), two.v.data(), sizeof(double) * static_cast<std::size_t>(one.v.size())), 0);
 }
@@ -267,7 +275,8 @@ TEST_P(Steppers, SayThatTheyDivergedAndLeaveTheStartState) {
   for (const double bad : {1e12, nan}) {
     State state = laid_down(scene, 0.1);
     const State start = state;
-    EXPECT_EQ(stepper->step(kDt, Eigen::VectorXd::Constant(body.edge_count(), bad), nullptr, state, impulses), Termination::kDiverged);
+    EXPECT_EQ(stepper->step(kDt, Eigen::VectorXd::Constant(body.edge_count(), bad), nullptr, state, impulses),
+              Termination::kDiverged);
     EXPECT_EQ(state.x, start.x);
     EXPECT_EQ(state.v, start.v);
   }
@@ -298,11 +307,8 @@ TEST_P(Steppers, NeverCallAStateThatIsNoNumberDone) {
       ASSERT_TRUE(state.x.allFinite() && state.v.allFinite());
       if (termination == Termination::kDiverged) break;
     }
-    const Eigen::VectorXd jacobian = jacobians(scene.body, state.x);
-    printf("%s %s: done %d, J %g..%g\n", name_of(GetParam()).c_str(), flat ? "flat" : "inverted", done, jacobian.minCoeff(), jacobian.maxCoeff());
-    if (!flat) {
-      EXPECT_EQ(done, 480);
-    }
+    EXPECT_EQ(done, 480);
+    EXPECT_GT(jacobians(scene.body, state.x).minCoeff(), 0.99);  // both find back to the rest shape
   }
 }
 

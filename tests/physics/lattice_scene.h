@@ -79,7 +79,7 @@ inline Body bar(int nx, int ny, int nz, double cell, const Material& material = 
   return body_of(make_lattice(nx, ny, nz, cell), material);
 }
 
-/// A box of 9 x 2 x 3 cells of 0.1 m on four legs of two cells, about 1 m long: some 200 nodes.
+/// A box of 9 x 2 x 3 cells of 0.1 m on four legs of two cells, about 1 m long: some 150 nodes.
 inline Body four_legged(const Material& material = {}) {
   const auto keep = [](int i, int j, int k) { return j >= 2 || ((i == 0 || i == 8) && k != 1); };
   return body_of(make_lattice(9, 4, 3, 0.1, keep), material);

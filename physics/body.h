@@ -32,7 +32,7 @@ struct Material {
 
 /// The body of a tet mesh. `fill` [-] is the share of each tet that is matter: mass and stiffness follow it.
 /// Edge e gets k = 6 E V_e / l0^2 with V_e a sixth of the filled volume of the tets around it.
-/// `edges` must hold every edge of `tets` once, lower node first.
+/// `edges` must hold every edge of `tets` once, lower node first, in lexicographic order.
 Body make_body(const Eigen::Matrix3Xd& rest, const Eigen::Matrix4Xi& tets, const Eigen::Matrix2Xi& edges,
                const Eigen::VectorXd& fill, const Material& material);
 

@@ -9,26 +9,27 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr double kSinkage = 0.0005;      // of the body's size [-]: how deep one point sinks that bears the whole weight
+constexpr double kSinkage = 0.0005;          // of the body's size [-]: how deep one point sinks that bears the whole weight
 constexpr double kWeightOfNoGravity = 9.81;  // [m/s2] takes gravity's place in the contact stiffness where there is none
 constexpr int kNewtonSteps = 50;             // three or four are the rule
-constexpr int kFreeSteps = 4;                 // after them the normal force behind Coulomb's limit follows by halves
+constexpr int kFreeUpdates =
+    12;  // of the normal force behind Coulomb's limit; then by halves, for the two might go round for ever
 // A node's residual force is told as the velocity that it would give the node in a step, over the body's size [1/s].
-constexpr double kResidual = 1e-5;   // small enough
-constexpr double kGivenUp = 1e-2;    // after the last iterate: no solution was found
+constexpr double kResidual = 1e-4;      // small enough
+constexpr double kInnerDecrease = 0.3;  // of the residual [-] between two updates of the friction limits
+constexpr double kGivenUp = 1e-2;       // after the last iterate: no solution was found
 constexpr double kArmijo = 1e-4;
 constexpr int kHalvings = 20;
-constexpr double kRounding = 1e-12;      // of the potential [-]: a smaller decrease is none
+constexpr double kRounding = 1e-12;  // of the potential [-]: a smaller decrease is none
 
-/// Backward Euler as the minimum of an incremental potential, by Newton's method with the positive semi-definite parts of the
-/// Hessian and a line search.
+/// Backward Euler as the minimum of an incremental potential, by Newton's method with the positive semi-definite parts of
+/// the Hessian and a line search.
 ///
 /// Contact is a stiff one-sided spring per point; friction a spring to an anchor that is dragged along when it pulls harder
-/// than Coulomb's limit, with the normal force of the last iterate. What is booked are the forces at the end of the step, and
-/// the end velocity follows from them, so linear momentum balances to rounding. Backward Euler damps rotation: the loss of
-/// angular momentum is the method's own and no booked moment covers it.
-/// Source: Li et al., "Incremental Potential Contact", SIGGRAPH 2020, eq. (1) to (5), with springs for the barrier; the lagged
-/// normal force is section 5.4's.
+/// than Coulomb's limit, with the normal force of the last iterate. What is booked are the forces at the end of the step,
+/// and the end velocity follows from them, so linear momentum balances to rounding. Backward Euler damps rotation: the loss
+/// of angular momentum is the method's own and no booked moment covers it. Source: Li et al., "Incremental Potential
+/// Contact", SIGGRAPH 2020, eq. (1) to (5), with springs for the barrier; the lagged normal force is section 5.4's.
 class EulerStepper final : public Stepper {
  public:
   explicit EulerStepper(const Scene& scene)
@@ -48,8 +49,7 @@ class EulerStepper final : public Stepper {
         start_{scene.body.rest, scene.body.rest} {
     const double gravity = scene.gravity.norm();
     size_ = std::cbrt(scene.body.rest_volume.sum());
-    contact_stiffness_ =
-        scene.body.mass.sum() * (gravity > 0 ? gravity : kWeightOfNoGravity) / (kSinkage * size_);
+    contact_stiffness_ = scene.body.mass.sum() * (gravity > 0 ? gravity : kWeightOfNoGravity) / (kSinkage * size_);
   }
 
   double substep(double dt) const override { return dt; }
@@ -68,17 +68,23 @@ class EulerStepper final : public Stepper {
     trial_ = state.x + dt * state.v;
     update_friction_limits(state.x);
     state.x = potential(trial_, dt, activation) < potential(state.x, dt, activation) ? trial_ : state.x;
-    for (int k = 0; k < kNewtonSteps; ++k) {
-      update_friction_limits(state.x);
-      find_residual(state.x, dt, activation);
-      if (!(residual_speed(dt) > kResidual * size_)) break;
-      if (scene_.has_ground && k >= kFreeSteps) {
-        // Normal force and friction that answer each other by turns would go round for ever.
-        friction_limit_ = 0.5 * (friction_limit_ + last_limit_);
+    find_residual(state.x, dt, activation);
+    double enough = kResidual * size_;
+    for (int k = 0, updates = 0; k < kNewtonSteps; ++k) {
+      if (residual_speed(dt) <= enough) {
+        if (!scene_.has_ground) break;
+        last_limit_ = friction_limit_;
+        update_friction_limits(state.x);
         find_residual(state.x, dt, activation);
+        if (residual_speed(dt) <= kResidual * size_) break;
+        if (++updates > kFreeUpdates) {
+          friction_limit_ = 0.5 * (friction_limit_ + last_limit_);
+          find_residual(state.x, dt, activation);
+        }
+        enough = std::max(kResidual * size_, kInnerDecrease * residual_speed(dt));
       }
-      last_limit_ = friction_limit_;
       if (!move_downhill(dt, activation, state.x)) break;
+      find_residual(state.x, dt, activation);
     }
     update_friction_limits(state.x);
     find_residual(state.x, dt, activation);
@@ -258,11 +264,11 @@ class EulerStepper final : public Stepper {
 
   const Scene& scene_;
   SystemMatrix matrix_;
-  double size_ = 0, contact_stiffness_ = 0;          // [m], [N/m] of a contact point, normal and tangential
-  Eigen::Matrix3Xd anchor_, contact_force_;          // [m], [N] 3 x P
-  std::vector<char> touching_;                       // P: at the end of the last step
-  Eigen::VectorXd friction_limit_, last_limit_;      // [N] P, of this and the last Newton step
-  Eigen::Matrix3Xd foreseen_;                        // [m] where gravity and effects alone take the nodes
+  double size_ = 0, contact_stiffness_ = 0;      // [m], [N/m] of a contact point, normal and tangential
+  Eigen::Matrix3Xd anchor_, contact_force_;      // [m], [N] 3 x P
+  std::vector<char> touching_;                   // P: at the end of the last step
+  Eigen::VectorXd friction_limit_, last_limit_;  // [N] P, of this and the last Newton step
+  Eigen::Matrix3Xd foreseen_;                    // [m] where gravity and effects alone take the nodes
   Eigen::Matrix3Xd moved_, trial_, residual_, force_;
   Eigen::VectorXd direction_;
   State start_;

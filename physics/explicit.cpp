@@ -8,16 +8,26 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr double kStepMargin = 0.8;    // of the linear stability bound at rest
+constexpr double kStepMargin = 0.8;    // of the linear stability bound
+constexpr double kMostSubsteps = 1e5;  // of a step: a shape that wants more has run away
 constexpr double kPushOutSpeed = 0.5;  // [m/s] at most, with which a point that starts below the ground is lifted
 constexpr double kReach = 0.1;         // of the shortest edge [-]: points as near as that are watched
 constexpr int kContactSweeps = 30;
 constexpr double kContactTolerance = 1e-7;  // [m/s] change of a contact point's velocity in a sweep
 
-/// The largest substep [s] for which the linear motion about the rest shape is stable: 4 M - 2 h D - h^2 K stays positive, so
-/// the roots of the amplification polynomial stay in the unit disc. The dashpots act along edges alone, the stiffest modes are
-/// those of volume: with D itself the bound is several times longer than with D = (largest damping time) K.
-double stable_substep_at_rest(const Body& body) {
+struct StiffestMode {
+  double damping;            // [1/s]
+  double frequency_squared;  // [1/s2]
+};
+
+double longest_substep(const StiffestMode& mode) {
+  return (std::sqrt(mode.damping * mode.damping + 4 * mode.frequency_squared) - mode.damping) / mode.frequency_squared;
+}
+
+/// The mode that limits the substep h of the linear motion about the rest shape: while 4 M - 2 h D - h^2 K stays positive,
+/// the roots of the amplification polynomial stay in the unit disc. The dashpots act along edges alone, the stiffest modes
+/// are those of volume: with D itself the bound is several times longer than with D = (largest damping time) K.
+StiffestMode stiffest_mode_at_rest(const Body& body) {
   SystemMatrix stiffness(body), damping(body);
   stiffness.set_zero();
   stiffness.add_stiffness(body, body.rest, Eigen::VectorXd::Ones(body.edge_count()), 1);
@@ -28,17 +38,31 @@ double stable_substep_at_rest(const Body& body) {
   Eigen::VectorXd y(root_mass.size()), kz(y.size()), dz(y.size());
   for (Eigen::Index i = 0; i < y.size(); ++i) y[i] = std::cos(1.7 * static_cast<double>(i * i % 97));
   // Power iteration on M^-1 (2 h D + h^2 K) / 4 while h follows its largest eigenvalue toward 1, by Rayleigh's quotient.
-  double h = 1;
+  StiffestMode mode{};
   for (int k = 0; k < 300; ++k) {
     y.normalize();
     const Eigen::VectorXd z = y.cwiseQuotient(root_mass);
     kz = (stiffness.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
     dz = (damping.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
-    const double omega_squared = y.dot(kz), c = y.dot(dz);
-    h = (std::sqrt(c * c + 4 * omega_squared) - c) / omega_squared;
+    mode = {y.dot(dz), y.dot(kz)};
+    const double h = longest_substep(mode);
     y = 2 * h * dz + h * h * kz;
   }
-  return h / 1.02;  // what 300 iterations may still lack
+  return mode;
+}
+
+/// Largest of the tets' own frequencies squared [1/s2] by their volume springs: these stiffen with the square of the area of
+/// their faces.
+double stiffest_volume(const Body& body, const ConstPoints& x, const Eigen::VectorXd& inverse_mass) {
+  double largest = 0;
+  for (int t = 0; t < body.tet_count(); ++t) {
+    double jacobian;
+    const Eigen::Matrix<double, 3, 4> gradient = jacobian_gradient(x, body.tets, t, body.rest_volume[t], jacobian);
+    double sum = 0;
+    for (int k = 0; k < 4; ++k) sum += gradient.col(k).squaredNorm() * inverse_mass[body.tets(k, t)];
+    largest = std::max(largest, body.volume_stiffness[t] * sum);
+  }
+  return largest;
 }
 
 /// Symplectic Euler (velocity Verlet with velocities at half steps) with contact by impulses.
@@ -54,7 +78,8 @@ class ExplicitStepper final : public Stepper {
         impulse_(Eigen::Matrix3Xd::Zero(3, scene.contact_points.count())),
         inverse_mass_(scene.body.mass.cwiseInverse()),
         point_inverse_mass_(scene.contact_points.count()) {
-    stable_substep_ = kStepMargin * stable_substep_at_rest(scene.body);
+    mode_at_rest_ = stiffest_mode_at_rest(scene.body);
+    stiffest_volume_at_rest_ = stiffest_volume(scene.body, scene.body.rest, inverse_mass_);
     const ContactPoints& points = scene.contact_points;
     for (int p = 0; p < points.count(); ++p) {
       point_inverse_mass_[p] = 0;
@@ -67,13 +92,18 @@ class ExplicitStepper final : public Stepper {
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
 
-  double substep(double dt) const override { return dt / std::ceil(dt / stable_substep_); }
+  double substep(double dt) const override { return dt / std::ceil(dt / (kStepMargin * longest_substep(mode_at_rest_))); }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const Eigen::Matrix3Xd* effect_force, State& state,
                    Impulses& impulses) override {
-    const int substeps = static_cast<int>(std::ceil(dt / stable_substep_));
-    const double h = dt / substeps;
     start_ = state;
+    // The bound at rest, shortened by as much as the shape from which the step starts is stiffer.
+    StiffestMode mode = mode_at_rest_;
+    mode.frequency_squared *= std::max(1.0, stiffest_volume(scene_.body, state.x, inverse_mass_) / stiffest_volume_at_rest_);
+    const double count = std::ceil(dt / (kStepMargin * longest_substep(mode)));
+    if (!(count <= kMostSubsteps)) return Termination::kDiverged;
+    const int substeps = static_cast<int>(count);
+    const double h = dt / substeps;
     impulses.contact.setZero();
     impulses.contact_nodes.setZero();
     impulses.contact_moment.setZero();
@@ -118,8 +148,8 @@ class ExplicitStepper final : public Stepper {
     return scene_.ground.normal.dot(scene_.contact_points.of(x, p)) - scene_.ground.offset;
   }
 
-  /// The points that may touch the ground in this substep, in which no node moves farther than `farthest` [m], and in some to
-  /// come; what is left for those is returned [m].
+  /// The points that may touch the ground in this substep, in which no node moves farther than `farthest` [m], and in some
+  /// to come; what is left for those is returned [m].
   double find_candidates(double farthest, const State& state) {
     const double reach = kReach * shortest_edge_;
     candidates_.clear();
@@ -193,7 +223,9 @@ class ExplicitStepper final : public Stepper {
   Eigen::Matrix3Xd force_, impulse_;  // [N], [N s] of the last substep
   Eigen::VectorXd inverse_mass_, point_inverse_mass_;
   State start_;
-  double stable_substep_ = 0, shortest_edge_ = 0;
+  StiffestMode mode_at_rest_{};         // of the body at rest
+  double stiffest_volume_at_rest_ = 0;  // [1/s2]
+  double shortest_edge_ = 0;            // [m]
   std::vector<int> candidates_;
   std::vector<Active> active_;
 };

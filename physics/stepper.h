@@ -36,7 +36,7 @@ class Stepper {
   /// kDiverged: a value is not finite or the energy ran away; the state is then the one before the step.
   virtual Termination step(double dt, const Eigen::VectorXd& activation, const Eigen::Matrix3Xd* effect_force, State& state,
                            Impulses& impulses) = 0;
-  /// The method's own substep [s] for an outer step dt.
+  /// The method's own substep [s] for an outer step dt from the rest shape.
   virtual double substep(double dt) const = 0;
 };
 

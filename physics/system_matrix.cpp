@@ -69,7 +69,8 @@ void SystemMatrix::find_factor_pattern(const Body& body) {
 
   std::vector<std::vector<Source>> sources(order_.size());
   for (int e = 0; e < body.edge_count(); ++e) {
-    const int low = place[static_cast<std::size_t>(body.edges(0, e))], high = place[static_cast<std::size_t>(body.edges(1, e))];
+    const int low = place[static_cast<std::size_t>(body.edges(0, e))],
+              high = place[static_cast<std::size_t>(body.edges(1, e))];
     // The matrix holds (high node, low node); work_ wants (column, row), the place in the upper triangle.
     sources[static_cast<std::size_t>(std::max(low, high))].push_back({std::min(low, high), e, low < high});
   }
@@ -217,7 +218,8 @@ bool SystemMatrix::factor() {
       const Eigen::Matrix3d upper = block;
       block.setZero();
       for (int p = column_begin_[static_cast<std::size_t>(column)]; p < slot; ++p) {
-        work_[static_cast<std::size_t>(row_[static_cast<std::size_t>(p)])].noalias() -= l_[static_cast<std::size_t>(p)] * upper;
+        work_[static_cast<std::size_t>(row_[static_cast<std::size_t>(p)])].noalias() -=
+            l_[static_cast<std::size_t>(p)] * upper;
       }
       Eigen::Matrix3d& l = l_[static_cast<std::size_t>(slot)];
       l.noalias() = upper.transpose() * d_inverse_[static_cast<std::size_t>(column)];

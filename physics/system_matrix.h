@@ -44,7 +44,8 @@ class SystemMatrix {
   std::vector<int> edge_begin_;     // N + 1: the edges whose lower node is i (edges are in lexicographic order)
   std::vector<int> edge_high_;      // E
 
-  // The factor: node order_[k] stands at place k, of column k the rows row_[column_begin_[k]] ... below the diagonal are filled.
+  // The factor: node order_[k] stands at place k, of column k the rows row_[column_begin_[k]] ... below the diagonal are
+  // filled.
   struct Entry {  // block of row k of the factor
     int column, slot;
   };

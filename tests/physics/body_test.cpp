@@ -11,8 +11,9 @@ TEST(MakeBody, HoldsTheMassAndVolumeOfWhatFillsTheLattice) {
   const Lattice lattice = make_lattice(3, 2, 4, 0.1);
   Material material;
   material.density = 800;
-  const Body body = make_body(lattice.nodes, lattice.tets, lattice.edges, Eigen::VectorXd::Constant(lattice.tets.cols(), 0.5), material);
-  EXPECT_NEAR(body.rest_volume.sum(), 0.024, 1e-15);      // [m3] of the whole tets
+  const Body body =
+      make_body(lattice.nodes, lattice.tets, lattice.edges, Eigen::VectorXd::Constant(lattice.tets.cols(), 0.5), material);
+  EXPECT_NEAR(body.rest_volume.sum(), 0.024, 1e-15);       // [m3] of the whole tets
   EXPECT_NEAR(body.mass.sum(), 0.5 * 800 * 0.024, 1e-12);  // [kg] of the filled half
   EXPECT_NEAR(volume(body, body.rest), 0.024, 1e-15);
   EXPECT_GT(body.mass.minCoeff(), 0);
@@ -59,12 +60,14 @@ TEST(AngularMomentum, OfARigidTurnIsInertiaTimesItsRate) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const Body body = random_body(seed);
-    const Eigen::Vector3d rate = random_points(random, 1, 5), drift = random_points(random, 1, 2), about = random_points(random, 1, 1);
+    const Eigen::Vector3d rate = random_points(random, 1, 5), drift = random_points(random, 1, 2),
+                          about = random_points(random, 1, 1);
     const Eigen::Vector3d centre = centre_of_mass(body, body.rest);
     Eigen::Matrix3Xd v(3, body.node_count());
     for (int i = 0; i < body.node_count(); ++i) v.col(i) = drift + rate.cross(body.rest.col(i) - centre);
     EXPECT_LT((momentum(body, v) - body.mass.sum() * drift).norm(), 1e-12);
-    const Eigen::Vector3d expected = inertia(body, body.rest, centre) * rate + body.mass.sum() * (centre - about).cross(drift);
+    const Eigen::Vector3d expected =
+        inertia(body, body.rest, centre) * rate + body.mass.sum() * (centre - about).cross(drift);
     EXPECT_LT((angular_momentum(body, body.rest, v, about) - expected).norm(), 1e-11);
   }
 }

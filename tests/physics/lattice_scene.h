@@ -26,8 +26,9 @@ struct Lattice {
 };
 
 /// The cells (i, j, k) of nx x ny x nz for which `keep` holds, of `cell` [m], from the origin along the axes.
-inline Lattice make_lattice(int nx, int ny, int nz, double cell,
-                            const std::function<bool(int, int, int)>& keep = [](int, int, int) { return true; }) {
+inline Lattice make_lattice(
+    int nx, int ny, int nz, double cell,
+    const std::function<bool(int, int, int)>& keep = [](int, int, int) { return true; }) {
   constexpr int kTets[5][4] = {{0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}, {1, 2, 4, 7}};
   std::map<std::array<int, 3>, int> index_of;
   std::vector<Eigen::Vector3d> places;
@@ -78,7 +79,7 @@ inline Body bar(int nx, int ny, int nz, double cell, const Material& material = 
   return body_of(make_lattice(nx, ny, nz, cell), material);
 }
 
-/// A box of 9 x 2 x 3 cells of 0.1 m on four legs of two cells, about 1 m long: some 200 nodes.
+/// A box of 9 x 2 x 3 cells of 0.1 m on four legs of two cells, about 1 m long: some 150 nodes.
 inline Body four_legged(const Material& material = {}) {
   const auto keep = [](int i, int j, int k) { return j >= 2 || ((i == 0 || i == 8) && k != 1); };
   return body_of(make_lattice(9, 4, 3, 0.1, keep), material);
@@ -141,7 +142,8 @@ inline std::vector<int> soles(const Body& body) {
   return nodes;
 }
 
-/// Contact points on the faces below the body: `points_per_tet` a tet that has a sole face, with random weights, beside its nodes.
+/// Contact points on the faces below the body: `points_per_tet` a tet that has a sole face, with random weights, beside its
+/// nodes.
 inline void add_skin_points(Scene& scene, int points_per_tet, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(0.05, 1);
@@ -171,7 +173,8 @@ inline Ground slope(double degrees, double friction) {
 /// The body laid on the ground with its soles, at rest.
 inline State laid_down(const Scene& scene, double gap = 0) {
   const Body& body = scene.body;
-  const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), scene.ground.normal).toRotationMatrix();
+  const Eigen::Matrix3d turn =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), scene.ground.normal).toRotationMatrix();
   State state{turn * body.rest, Eigen::Matrix3Xd::Zero(3, body.node_count())};
   const double lowest = (scene.ground.normal.transpose() * state.x).minCoeff();
   state.x.colwise() += (scene.ground.offset + gap - lowest) * scene.ground.normal;

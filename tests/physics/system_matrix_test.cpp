@@ -78,7 +78,8 @@ TEST(SystemMatrix, IsPositiveSemiDefiniteInAnyState) {
     const Eigen::Matrix3Xd x = body.rest + random_points(random, body.node_count(), 0.1);  // inverted tets among them
     SystemMatrix matrix = zero_matrix(body);
     matrix.add_stiffness(body, x, random_activation(random, body, 0.4), 1);
-    const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(dense(matrix), Eigen::EigenvaluesOnly).eigenvalues();
+    const Eigen::VectorXd eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(dense(matrix), Eigen::EigenvaluesOnly).eigenvalues();
     EXPECT_GT(eigenvalues.minCoeff(), -1e-12 * eigenvalues.maxCoeff());
   }
 }
@@ -95,7 +96,8 @@ TEST(SystemMatrix, ContactIsASpringAtTheEmbeddedPoint) {
     SystemMatrix matrix = zero_matrix(body);
     matrix.add_contact(points, 0, block);
     Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(3, 3 * body.node_count());
-    for (int k = 0; k < 4; ++k) weights.middleCols<3>(3 * points.nodes(k, 0)) = points.weights(k, 0) * Eigen::Matrix3d::Identity();
+    for (int k = 0; k < 4; ++k)
+      weights.middleCols<3>(3 * points.nodes(k, 0)) = points.weights(k, 0) * Eigen::Matrix3d::Identity();
     const Eigen::MatrixXd expected = weights.transpose() * block * weights;
     EXPECT_LT((dense(matrix) - expected).norm(), 1e-14);
   }
@@ -109,7 +111,8 @@ TEST(SystemMatrix, SolvesForSeveralColumnsAtOnce) {
     const double dt = 1.0 / 240;
     SystemMatrix matrix = zero_matrix(body);
     matrix.add_mass(body, 1 / (dt * dt));
-    matrix.add_stiffness(body, body.rest + random_points(random, body.node_count(), 0.02), random_activation(random, body, 0.3), 1);
+    matrix.add_stiffness(body, body.rest + random_points(random, body.node_count(), 0.02),
+                         random_activation(random, body, 0.3), 1);
     matrix.add_damping(body, body.rest, 1 / dt);
     ASSERT_TRUE(matrix.factor());
     const Eigen::MatrixXd wanted = random_points(random, body.node_count() * 5, 1).reshaped(3 * body.node_count(), 5);

@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -143,6 +144,12 @@ pid_t start_worker(const std::string& path, int answer_descriptor) {
   return pid;
 }
 
+std::string seconds_text(std::chrono::milliseconds time) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%g s", static_cast<double>(time.count()) / 1000);
+  return text.data();
+}
+
 /// Reads until the other end closes. Throws Error after the time limit or past the size limit.
 std::string read_answer(int descriptor, const std::string& path, std::chrono::milliseconds time_limit) {
   const auto deadline = std::chrono::steady_clock::now() + time_limit;
@@ -154,7 +161,7 @@ std::string read_answer(int descriptor, const std::string& path, std::chrono::mi
     const int ready = left.count() > 0 ? poll(&waited, 1, static_cast<int>(left.count())) : 0;
     if (ready < 0 && errno == EINTR) continue;
     if (ready == 0) {
-      throw Error(path, "import", "reading it takes longer than " + std::to_string(time_limit.count()) + " ms",
+      throw Error(path, "import", "reading it takes longer than " + seconds_text(time_limit),
                   "Cut polygons of very many corners into triangles and export the file anew");
     }
     const ssize_t got = read(descriptor, block.data(), block.size());

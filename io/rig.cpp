@@ -6,7 +6,8 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <tuple>
+#include <set>
+#include <utility>
 
 #include "io/scene_pose.h"
 #include "retarget/error.h"
@@ -81,6 +82,7 @@ class RigBuilder {
     if (!skinned_.empty()) {
       bind_stray_vertices();
       weld();
+      face_outward();
     }
     return std::move(rig_);
   }
@@ -392,6 +394,26 @@ class RigBuilder {
     }
     welded.triangles.conservativeResize(Eigen::NoChange, kept);
     skin = std::move(welded);
+  }
+
+  /// Turns the triangles of a closed skin round where they face inward.
+  void face_outward() {
+    retarget::SkinnedMesh& skin = rig_.skin;
+    std::set<std::pair<int, int>> edges;
+    double volume = 0;
+    for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
+      const Eigen::Vector3i corners = skin.triangles.col(t);
+      for (int c = 0; c < 3; ++c) edges.emplace(corners[c], corners[(c + 1) % 3]);
+      const Eigen::Vector3d a = skin.vertices.col(corners[0]), b = skin.vertices.col(corners[1]),
+                            c = skin.vertices.col(corners[2]);
+      volume += a.dot(b.cross(c)) / 6;
+    }
+    const bool closed = std::all_of(edges.begin(), edges.end(), [&](const std::pair<int, int>& edge) {
+      return edges.contains({edge.second, edge.first});
+    });
+    if (!closed || volume >= 0) return;
+    skin.triangles.row(1).swap(skin.triangles.row(2));
+    rig_.warnings.push_back("The skin's triangles face inward; they are turned round.");
   }
 
   /// Both lists are sorted by bone.

@@ -153,6 +153,35 @@ TEST(BuildRig, AMeshBelowABoneMovesWithIt) {
   EXPECT_LT((found.rightCols(3) - wanted).norm(), 1e-12);
 }
 
+TEST(BuildRig, AClosedSkinFacesOutward) {
+  Scene scene = random_scene(4, Binding::kOnePose);
+  scene.meshes.pop_back();
+  for (SceneMesh::Joint& joint : scene.meshes[0].joints) joint.inverse_bind_matrix.setIdentity();
+  SceneMesh& mesh = scene.meshes[0];
+  mesh.vertices.setZero();
+  mesh.vertices.block(0, 1, 3, 3).setIdentity();
+  mesh.vertices.rightCols(6).setConstant(2);  // loose points
+  mesh.triangles.resize(3, 4);
+  mesh.triangles << 0, 0, 0, 1,  //
+      2, 3, 1, 2,                //
+      1, 2, 3, 3;
+  const Rig outward = build_rig(scene, "file");
+  EXPECT_TRUE(outward.warnings.empty());
+  scene.meshes[0].triangles.row(0).swap(scene.meshes[0].triangles.row(1));
+  const Rig turned = build_rig(scene, "file");
+  ASSERT_EQ(turned.warnings.size(), 1u);
+  for (const Rig* rig : {&outward, &turned}) {
+    double volume = 0;
+    for (Eigen::Index t = 0; t < 4; ++t) {
+      const Eigen::Vector3i corners = rig->skin.triangles.col(t);
+      Eigen::Matrix3d sides;
+      for (int c = 0; c < 3; ++c) sides.col(c) = rig->skin.vertices.col(corners[c]);
+      volume += sides.determinant() / 6;
+    }
+    EXPECT_GT(volume, 0);
+  }
+}
+
 TEST(BuildRig, ASingularInverseBindMatrixIsRefused) {
   Scene scene = random_scene(0, Binding::kOnePose);
   scene.meshes[0].joints[2].inverse_bind_matrix.linear().col(1).setZero();

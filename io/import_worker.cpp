@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -31,7 +32,6 @@ constexpr int kAnswerDescriptor = 3;
 constexpr rlim_t kMemoryLimit = rlim_t{3} << 30;                // [bytes]
 constexpr std::size_t kAnswerLimit = std::size_t{1} << 30;      // [bytes]
 constexpr std::uintmax_t kFileLimit = std::uintmax_t{1} << 30;  // [bytes]
-constexpr std::chrono::seconds kTimeLimit{20};
 
 std::string& worker_executable() {
   static std::string path = "/proc/self/exe";
@@ -144,9 +144,15 @@ pid_t start_worker(const std::string& path, int answer_descriptor) {
   return pid;
 }
 
+std::string seconds_text(std::chrono::milliseconds time) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%g s", static_cast<double>(time.count()) / 1000);
+  return text.data();
+}
+
 /// Reads until the other end closes. Throws Error after the time limit or past the size limit.
-std::string read_answer(int descriptor, const std::string& path) {
-  const auto deadline = std::chrono::steady_clock::now() + kTimeLimit;
+std::string read_answer(int descriptor, const std::string& path, std::chrono::milliseconds time_limit) {
+  const auto deadline = std::chrono::steady_clock::now() + time_limit;
   std::string bytes;
   std::array<char, 1 << 16> block;
   while (true) {
@@ -155,7 +161,7 @@ std::string read_answer(int descriptor, const std::string& path) {
     const int ready = left.count() > 0 ? poll(&waited, 1, static_cast<int>(left.count())) : 0;
     if (ready < 0 && errno == EINTR) continue;
     if (ready == 0) {
-      throw Error(path, "import", "reading it takes longer than " + std::to_string(kTimeLimit.count()) + " s",
+      throw Error(path, "import", "reading it takes longer than " + seconds_text(time_limit),
                   "Cut polygons of very many corners into triangles and export the file anew");
     }
     const ssize_t got = read(descriptor, block.data(), block.size());
@@ -192,7 +198,7 @@ std::optional<int> run_import_worker(int argc, char** argv) {
 
 void set_import_worker_executable(const std::string& path) { worker_executable() = path; }
 
-Scene read_in_worker(const std::string& path) {
+Scene read_in_worker(const std::string& path, std::chrono::milliseconds time_limit) {
   require_readable_file(path);
   // A program that forgot run_import_worker() would start itself without end.
   if (std::getenv(kWorkerMark) != nullptr) {
@@ -205,7 +211,7 @@ Scene read_in_worker(const std::string& path) {
   Descriptor reading{ends[0]}, writing{ends[1]};
   Child worker{start_worker(path, writing.value)};
   writing.close_now();
-  const std::string bytes = read_answer(reading.value, path);
+  const std::string bytes = read_answer(reading.value, path, time_limit);
   const int status = worker.wait_for_end();
   if (WIFSIGNALED(status)) {
     throw Error(path, "import", std::string("the file brings its reader down (") + strsignal(WTERMSIG(status)) + ")",

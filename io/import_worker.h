@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 
@@ -18,6 +19,6 @@ void set_import_worker_executable(const std::string& path);
 /// Reads a clip file in a process of its own, under a limit of memory (3 GiB; not under a sanitizer) and of time (20 s), so
 /// that a file which brings the reader down brings down nothing else. Throws Error: the file is missing, refused, or ends
 /// the reader.
-Scene read_in_worker(const std::string& path);
+Scene read_in_worker(const std::string& path, std::chrono::milliseconds time_limit = std::chrono::seconds(20));
 
 }  // namespace hydrostat::io

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "io/clip_range.h"
@@ -15,6 +16,7 @@ namespace {
 constexpr std::array<double, 5> kFractions{0, 0.15, 0.4, 0.7, 1};
 constexpr double kLoopDefect = 0.02, kInPlaceTravel = 0.05, kSlide = 0.1, kLow = 0.03;  // relative to L
 constexpr int kSlideFrames = 30;
+constexpr double kSmallest = 0.01, kLargest = 30;  // [m]; what a creature's length lies between
 
 /// The skinned vertices [m], or the joints where there is no mesh, at a time of the clip.
 Eigen::Matrix3Xd points_at(const Rig& rig, const Scene& scene, const SceneClip& clip, double time_s) {
@@ -80,12 +82,21 @@ ClipInfo describe_clip(const Rig& rig, const Scene& scene, std::size_t index) {
 
 nlohmann::ordered_json to_list(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
 
+void warn_of_size(const ClipInfo& clip, std::vector<std::string>& warnings) {
+  const double length = (clip.bbox.front().max - clip.bbox.front().min).maxCoeff();
+  if (length >= kSmallest && length <= kLargest) return;
+  std::array<char, 32> metres{};
+  std::snprintf(metres.data(), metres.size(), "%.3g", length);
+  warnings.push_back(std::string("The character is ") + metres.data() +
+                     " m long, which is no creature's size; give its height.");
+}
+
 }  // namespace
 
 FileInfo inspect(const std::string& path) {
   const Scene scene = read_in_worker(path);
   const Rig rig = build_rig(scene, path);
-  choose_clip(scene, "", path);
+  const std::size_t first_moving = choose_clip(scene, "", path);
   FileInfo info;
   info.file = path;
   info.format = scene.format;
@@ -103,6 +114,7 @@ FileInfo inspect(const std::string& path) {
   for (std::size_t c = 0; c < scene.clips.size(); ++c) info.clips.push_back(describe_clip(rig, scene, c));
   info.warnings = scene.warnings;
   info.warnings.insert(info.warnings.end(), rig.warnings.begin(), rig.warnings.end());
+  warn_of_size(info.clips[first_moving], info.warnings);
   return info;
 }
 

@@ -59,7 +59,9 @@ class AssimpReader {
   explicit AssimpReader(const std::string& path) : path_(path) {
     scene_.format = format_of(path);
     set_up(importer_);
-    theirs_ = importer_.ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
+    // The validation refuses scenes without a mesh, which is what BVH files are.
+    const unsigned validation = scene_.format == "bvh" ? 0U : static_cast<unsigned>(aiProcess_ValidateDataStructure);
+    theirs_ = importer_.ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType | validation);
     if (theirs_ == nullptr || theirs_->mRootNode == nullptr) refuse_file(importer_.GetErrorString());
   }
 

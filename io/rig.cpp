@@ -6,7 +6,8 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <tuple>
+#include <set>
+#include <utility>
 
 #include "io/scene_pose.h"
 #include "retarget/error.h"
@@ -58,7 +59,13 @@ class RigBuilder {
         path_(path),
         rest_(node_poses(scene, nullptr, 0)),
         bind_(scene.nodes.size()),
-        bone_of_(scene.nodes.size(), -1) {}
+        bone_of_(scene.nodes.size(), -1) {
+    moved_.assign(scene.nodes.size(), false);
+    weighted_.assign(scene.nodes.size(), false);
+    for (const SceneClip& clip : scene.clips) {
+      for (const Channel& channel : clip.channels) moved_[static_cast<std::size_t>(channel.node)] = true;
+    }
+  }
 
   Rig build() {
     rig_.to_ours = Eigen::Affine3d(scene_.metres_per_unit * scene_.to_y_up);
@@ -68,7 +75,6 @@ class RigBuilder {
     if (skinned_.empty()) {
       require_skeleton_alone();
     } else {
-      warn_of_meshes_left_out();
       bind_meshes();
     }
     add_bones();
@@ -76,6 +82,7 @@ class RigBuilder {
     if (!skinned_.empty()) {
       bind_stray_vertices();
       weld();
+      face_outward();
     }
     return std::move(rig_);
   }
@@ -96,14 +103,8 @@ class RigBuilder {
                 "Bind the mesh to bones and export it with its skin and its clip");
   }
 
-  void warn_of_meshes_left_out() {
-    const std::size_t left_out = scene_.meshes.size() - skinned_.size();
-    if (left_out == 0) return;
-    rig_.warnings.push_back(std::to_string(left_out) + " of " + std::to_string(scene_.meshes.size()) +
-                            " meshes are not bound to bones and are left out.");
-  }
-
-  /// Finds one bind pose for the bones of all meshes, and what takes each mesh into it. The mesh of most vertices leads.
+  /// Finds one bind pose for the bones of all meshes, and what takes each mesh into it. The skinned mesh of most vertices
+  /// leads.
   void bind_meshes() {
     std::stable_sort(skinned_.begin(), skinned_.end(),
                      [](const SceneMesh* a, const SceneMesh* b) { return a->vertices.cols() > b->vertices.cols(); });
@@ -113,11 +114,55 @@ class RigBuilder {
         throw Error(path_, "bone '" + name_of(joint.node) + "'", "its inverse bind matrix is singular",
                     "Give the bone a scale other than 0 in the bind pose");
       }
-      into_bind_.push_back(into_bind_space(*mesh));
-      bound_.push_back(bind_joints(*mesh, into_bind_.back()));
+      bind_mesh(*mesh);
     }
     for (std::size_t m = 0; m < skinned_.size(); ++m) bind_weightless_joints(*skinned_[m], into_bind_[m]);
+    find_rigid_parts();
+    for (const SceneMesh& part : rigid_parts_) {
+      skinned_.push_back(&part);
+      bind_mesh(part);
+    }
   }
+
+  void bind_mesh(const SceneMesh& mesh) {
+    into_bind_.push_back(into_bind_space(mesh));
+    bound_.push_back(bind_joints(mesh, into_bind_.back()));
+  }
+
+  /// Meshes without a skin that hang below a bone (a robot's plates) belong to the body: each goes whole with the nearest
+  /// node above it that moves by itself. Other meshes (a static double, the floor) stay out.
+  void find_rigid_parts() {
+    int left_out = 0;
+    for (const SceneMesh& mesh : scene_.meshes) {
+      if (is_skinned(mesh)) continue;
+      int carrier = mesh.node;
+      while (!moved_[static_cast<std::size_t>(carrier)] && !node(carrier).is_joint && node(carrier).parent >= 0)
+        carrier = node(carrier).parent;
+      if (!hangs_below_joint(mesh.node) || is_singular(rest_[static_cast<std::size_t>(carrier)]) ||
+          is_singular(rest_[static_cast<std::size_t>(mesh.node)])) {
+        ++left_out;
+        continue;
+      }
+      SceneMesh part = mesh;
+      SceneMesh::Joint joint;
+      joint.node = carrier;
+      joint.inverse_bind_matrix =
+          rest_[static_cast<std::size_t>(carrier)].inverse() * rest_[static_cast<std::size_t>(mesh.node)];
+      for (int v = 0; v < mesh.vertices.cols(); ++v) joint.weights.push_back({v, 1});
+      part.joints = {joint};
+      rigid_parts_.push_back(std::move(part));
+    }
+    if (left_out == 0) return;
+    rig_.warnings.push_back(std::to_string(left_out) + " of " + std::to_string(scene_.meshes.size()) +
+                            " meshes are not bound to bones and are left out.");
+  }
+
+  bool hangs_below_joint(int n) const {
+    while (n >= 0 && !node(n).is_joint) n = node(n).parent;
+    return n >= 0;
+  }
+
+  const SceneNode& node(int index) const { return scene_.nodes[static_cast<std::size_t>(index)]; }
 
   /// What takes the mesh's space to the common bind space, by the heaviest joint whose bind pose is known.
   Eigen::Affine3d into_bind_space(const SceneMesh& mesh) const {
@@ -146,7 +191,6 @@ class RigBuilder {
       std::optional<Eigen::Affine3d>& bind = bind_[static_cast<std::size_t>(joint.node)];
       if (!bind) bind = bound[j].bind;
       bound[j].twin = difference(*bind * joint.inverse_bind_matrix, into_bind, mesh.vertices) > tolerance;
-      weighted_.resize(scene_.nodes.size(), false);
       weighted_[static_cast<std::size_t>(joint.node)] = true;
     }
     return bound;
@@ -187,24 +231,21 @@ class RigBuilder {
   /// Which scene nodes are bones.
   std::vector<bool> bones() const {
     const std::size_t count = scene_.nodes.size();
-    std::vector<bool> moved(count, false), leads(count, false), hangs(count, false), chosen(count, false);
-    for (const SceneClip& clip : scene_.clips) {
-      for (const Channel& channel : clip.channels) moved[static_cast<std::size_t>(channel.node)] = true;
-    }
+    std::vector<bool> leads(count, false), hangs(count, false), chosen(count, false);
     const auto is_named = [&](std::size_t n) {
-      return skinned_.empty() ? static_cast<bool>(moved[n]) : scene_.nodes[n].is_joint;
+      return skinned_.empty() ? static_cast<bool>(moved_[n]) : scene_.nodes[n].is_joint;
     };
     for (std::size_t n = count; n-- > 0;) {  // what leads down to a named bone
       const int parent = scene_.nodes[n].parent;
       if (parent >= 0 && (is_named(n) || leads[n])) leads[static_cast<std::size_t>(parent)] = true;
     }
     for (std::size_t n = 0; n < count; ++n) {
-      const SceneNode& node = scene_.nodes[n];
-      const std::size_t parent = static_cast<std::size_t>(std::max(node.parent, 0));
-      const bool below_bone = node.parent >= 0 && chosen[parent];
-      const bool below_weights = node.parent >= 0 && hangs[parent];
-      hangs[n] = (skinned_.empty() ? is_named(n) : weighted_[n]) || (below_weights && !node.holds_mesh);
-      chosen[n] = is_named(n) || hangs[n] || (leads[n] && (moved[n] || below_bone));
+      const SceneNode& here = scene_.nodes[n];
+      const std::size_t parent = static_cast<std::size_t>(std::max(here.parent, 0));
+      const bool below_bone = here.parent >= 0 && chosen[parent];
+      const bool below_weights = here.parent >= 0 && hangs[parent];
+      hangs[n] = (skinned_.empty() ? is_named(n) : weighted_[n]) || (below_weights && !here.holds_mesh);
+      chosen[n] = is_named(n) || hangs[n] || (leads[n] && (moved_[n] || below_bone));
     }
     return chosen;
   }
@@ -355,6 +396,26 @@ class RigBuilder {
     skin = std::move(welded);
   }
 
+  /// Turns the triangles of a closed skin round where they face inward.
+  void face_outward() {
+    retarget::SkinnedMesh& skin = rig_.skin;
+    std::set<std::pair<int, int>> edges;
+    double volume = 0;
+    for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
+      const Eigen::Vector3i corners = skin.triangles.col(t);
+      for (int c = 0; c < 3; ++c) edges.emplace(corners[c], corners[(c + 1) % 3]);
+      const Eigen::Vector3d a = skin.vertices.col(corners[0]), b = skin.vertices.col(corners[1]),
+                            c = skin.vertices.col(corners[2]);
+      volume += a.dot(b.cross(c)) / 6;
+    }
+    const bool closed = std::all_of(edges.begin(), edges.end(), [&](const std::pair<int, int>& edge) {
+      return edges.contains({edge.second, edge.first});
+    });
+    if (!closed || volume >= 0) return;
+    skin.triangles.row(1).swap(skin.triangles.row(2));
+    rig_.warnings.push_back("The skin's triangles face inward; they are turned round.");
+  }
+
   /// Both lists are sorted by bone.
   static bool weights_agree(const std::vector<retarget::SkinnedMesh::Influence>& a,
                             const std::vector<retarget::SkinnedMesh::Influence>& b) {
@@ -367,9 +428,11 @@ class RigBuilder {
   const std::string& path_;
   const std::vector<Eigen::Affine3d> rest_;           // of every scene node
   std::vector<std::optional<Eigen::Affine3d>> bind_;  // of every scene node, bone space to the common bind space, file units
+  std::vector<bool> moved_;                           // of every scene node: some clip has keys for it
   std::vector<bool> weighted_;                        // of every scene node
   std::vector<int> bone_of_;                          // of every scene node; -1 is none
-  std::vector<const SceneMesh*> skinned_;
+  std::vector<const SceneMesh*> skinned_;             // rigid parts come last
+  std::vector<SceneMesh> rigid_parts_;
   std::vector<Eigen::Affine3d> into_bind_;  // of every skinned mesh
   std::vector<std::vector<Bound>> bound_;   // of every skinned mesh, its joints
   std::map<std::string, int> uses_of_name_;

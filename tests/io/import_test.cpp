@@ -1,0 +1,553 @@
+#include "io/import.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "io/import_worker.h"
+#include "retarget/error.h"
+#include "tests/io/tiny_gltf_file.h"
+
+namespace hydrostat::io {
+namespace {
+
+using Box = std::array<double, 6>;  // min x y z, max x y z
+
+const std::string kSamples = HYDROSTAT_SAMPLES;
+
+/// Where clips lie that others made and that are not part of this project; empty when they are not there.
+std::string assets() {
+  const char* set = std::getenv("HYDROSTAT_ASSETS");
+  const std::string directory = set ? set : HYDROSTAT_ASSETS_DEFAULT;
+  return std::filesystem::exists(directory + "/golden_bbox.json") ? directory : std::string();
+}
+
+class ImportEnvironment : public testing::Environment {
+  void SetUp() override {
+    set_import_worker_executable(HYDROSTAT_BINARY);
+    if (assets().empty())
+      std::cout << "Tests on third-party clips are left out: HYDROSTAT_ASSETS names no directory that holds them.\n";
+  }
+};
+const testing::Environment* const kEnvironment = testing::AddGlobalTestEnvironment(new ImportEnvironment);
+
+/// A directory of its own for a test, gone when it ends.
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "hydrostat_XXXXXX").string();
+    path_ = mkdtemp(pattern.data());
+  }
+  ~TemporaryDirectory() { std::filesystem::remove_all(path_); }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+std::string write_file(const std::string& path, const std::string& text) {
+  std::ofstream(path) << text;
+  return path;
+}
+
+double extent(const Box& box) { return std::max({box[3] - box[0], box[4] - box[1], box[5] - box[2]}); }
+
+/// Largest distance of a face from where it should be, relative to the box's largest extent.
+double misfit(const BoxInfo& found, const Box& wanted) {
+  double worst = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    worst = std::max({worst, std::abs(found.min[axis] - wanted[a]), std::abs(found.max[axis] - wanted[a + 3])});
+  }
+  return worst / extent(wanted);
+}
+
+Box box_of(const Eigen::Matrix3Xd& points) {
+  const Eigen::Vector3d low = points.rowwise().minCoeff(), high = points.rowwise().maxCoeff();
+  return {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+}
+
+/// What the command prints, both streams, and its exit code.
+struct Outcome {
+  std::string text;
+  int exit_code;
+};
+Outcome run(const std::string& arguments) {
+  FILE* pipe = popen((std::string(HYDROSTAT_BINARY) + " " + arguments + " 2>&1").c_str(), "r");
+  std::string text;
+  for (int letter = fgetc(pipe); letter != EOF; letter = fgetc(pipe)) text.push_back(static_cast<char>(letter));
+  const int status = pclose(pipe);
+  return {text, WIFEXITED(status) ? WEXITSTATUS(status) : -1};
+}
+
+template <typename Act>
+Error error_of(Act&& act) {
+  try {
+    act();
+  } catch (const Error& error) {
+    return error;
+  }
+  ADD_FAILURE() << "no Error was thrown";
+  return Error("", "", "", "");
+}
+
+// --- our own samples; boxes [m], y up, as two other readers (ufbx, Blender) have them
+
+struct Sample {
+  const char* file;
+  double duration_s;
+  bool loop;
+  double speed_m_s;
+  std::array<Box, 5> boxes;
+};
+const std::array<Sample, 3> kSampleClips{{{"worm_crawl.glb",
+                                           2,
+                                           true,
+                                           0.076,
+                                           {{Box{-0.0343275, 0.000242064, -0.002, 0.0343275, 0.208383, 0.442},
+                                             Box{-0.0343275, 0.000198253, -0.002, 0.0343275, 0.203949, 0.461759},
+                                             Box{-0.0343275, 0.000324286, -0.002, 0.0343275, 0.115495, 0.589138},
+                                             Box{-0.0343275, 8.96154e-05, 0.0428469, 0.0343275, 0.164315, 0.594154},
+                                             Box{-0.0343275, 0.000242079, 0.15, 0.0343275, 0.208383, 0.594}}}},
+                                          {"boxdog_trot.fbx",
+                                           0.6,
+                                           true,
+                                           0.9,
+                                           {{Box{-0.145022, -4.43628e-08, -0.541833, 0.144975, 0.726644, 0.699899},
+                                             Box{-0.145022, -8.06559e-05, -0.437562, 0.144975, 0.709939, 0.787034},
+                                             Box{-0.145022, -8.02243e-05, -0.309337, 0.144975, 0.740141, 0.911675},
+                                             Box{-0.145022, -5.0567e-05, -0.184859, 0.144975, 0.722096, 1.0796},
+                                             Box{-0.145022, -5.93253e-08, -0.00183292, 0.144975, 0.726644, 1.2399}}}},
+                                          {"boxdog_jump.glb",
+                                           1.5,
+                                           true,
+                                           0.3533,
+                                           {{Box{-0.145022, -3.4001e-07, -0.541842, 0.144976, 0.729697, 0.700089},
+                                             Box{-0.145022, -1.42362e-05, -0.541846, 0.144976, 0.636281, 0.700114},
+                                             Box{-0.145022, 0.136685, -0.363629, 0.144976, 0.934479, 0.89891},
+                                             Box{-0.145022, -3.68248e-07, -0.00702596, 0.144976, 0.620269, 1.23493},
+                                             Box{-0.145022, -5.25176e-07, -0.00702178, 0.144976, 0.729697, 1.23491}}}}}};
+
+class SampleClip : public testing::TestWithParam<Sample> {};
+
+TEST_P(SampleClip, StandsWhereOtherReadersSeeIt) {
+  const FileInfo info = inspect(kSamples + "/" + GetParam().file);
+  ASSERT_EQ(info.clips.size(), 1u);
+  const ClipInfo& clip = info.clips.front();
+  EXPECT_NEAR(clip.duration_s, GetParam().duration_s, 1e-3);
+  EXPECT_EQ(clip.loop, GetParam().loop);
+  EXPECT_FALSE(clip.in_place);
+  EXPECT_NEAR(clip.speed_m_s, GetParam().speed_m_s, 0.01 * GetParam().speed_m_s);
+  ASSERT_EQ(clip.bbox.size(), 5u);
+  for (std::size_t f = 0; f < 5; ++f) {
+    SCOPED_TRACE("fraction " + std::to_string(clip.bbox[f].fraction));
+    EXPECT_LT(misfit(clip.bbox[f], GetParam().boxes[f]), 0.003);
+  }
+}
+
+TEST_P(SampleClip, SkinningTheCharacterGivesTheSameBoxes) {
+  const std::string path = kSamples + "/" + GetParam().file;
+  // 20 intervals a range, so that the fractions fall on frames.
+  const double rate_hz = 20 / inspect(path).clips.front().range_s;
+  const retarget::Character character = import_character(path, "", {rate_hz});
+  ASSERT_EQ(character.clip.frames(), 21);
+  const std::array<int, 5> frames{0, 3, 8, 14, 20};
+  for (std::size_t f = 0; f < 5; ++f) {
+    const Box found = box_of(
+        skin_positions(character.skeleton, character.skin, character.clip.bone_pose[static_cast<std::size_t>(frames[f])]));
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(found[i], GetParam().boxes[f][i], 0.003 * extent(GetParam().boxes[f]));
+  }
+}
+
+TEST_P(SampleClip, BindPoseStandsAsTheCharacterAtItsFirstKey) {
+  const retarget::Character character = import_character(kSamples + "/" + GetParam().file, "", {});
+  const retarget::Skeleton& skeleton = character.skeleton;
+  std::vector<double> scales;
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (std::size_t b = 0; b < skeleton.bind_pose.size(); ++b) {
+    const Eigen::Matrix3d axes = skeleton.bind_pose[b].linear();
+    EXPECT_LT((axes.transpose() * axes - Eigen::Matrix3d::Identity()).norm(), 1e-9) << skeleton.names[b];
+    EXPECT_GT(axes.determinant(), 0);
+    EXPECT_LT(skeleton.parents[b], static_cast<int>(b));
+    if (!skeleton.weighted[b]) continue;
+    const Eigen::Matrix3d motion = (character.clip.bone_pose.front()[b] * skeleton.bind_pose[b].inverse()).linear();
+    scales.push_back(std::cbrt(motion.determinant()));
+    mean += motion;
+  }
+  std::nth_element(scales.begin(), scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2), scales.end());
+  EXPECT_NEAR(scales[scales.size() / 2], 1, 1e-6);
+  // Upright and facing as it does: every axis of the body is nearest to its own.
+  for (int axis = 0; axis < 3; ++axis) EXPECT_GT(mean(axis, axis), 0.7 * mean.col(axis).norm());
+}
+
+TEST_P(SampleClip, SkinIsClosedAndItsWeightsSumToOne) {
+  const retarget::Character character = import_character(kSamples + "/" + GetParam().file, "", {});
+  const retarget::SkinnedMesh& skin = character.skin;
+  std::map<std::pair<int, int>, int> uses;
+  for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
+    for (int corner = 0; corner < 3; ++corner) ++uses[{skin.triangles(corner, t), skin.triangles((corner + 1) % 3, t)}];
+  }
+  for (const auto& [edge, count] : uses) {
+    ASSERT_EQ(count, 1);
+    ASSERT_TRUE(uses.contains({edge.second, edge.first})) << "an open edge";
+  }
+  for (const auto& influences : skin.skin_weights) {
+    double sum = 0;
+    for (const auto& influence : influences) sum += influence.weight;
+    ASSERT_NEAR(sum, 1, 1e-12);
+  }
+}
+
+TEST_P(SampleClip, FramesAreUniformFromFirstToLastKey) {
+  const retarget::Clip clip = import_character(kSamples + "/" + GetParam().file, "0", {60}).clip;
+  EXPECT_EQ(clip.frames(), static_cast<int>(std::lround(60 * clip.range_s)) + 1);
+  EXPECT_DOUBLE_EQ(clip.rate_hz, (clip.frames() - 1) / clip.range_s);
+}
+
+INSTANTIATE_TEST_SUITE_P(Samples, SampleClip, testing::ValuesIn(kSampleClips), [](const auto& sample) {
+  std::string name = sample.param.file;
+  std::replace(name.begin(), name.end(), '.', '_');
+  return name;
+});
+
+// --- small files of our own
+
+Eigen::Vector3d tip_at(const std::string& path, double fraction) {
+  const retarget::Character character = import_character(path, "bow", {20});
+  const auto frame = static_cast<std::size_t>(std::lround(fraction * (character.clip.frames() - 1)));
+  const Eigen::Matrix3Xd points = skin_positions(character.skeleton, character.skin, character.clip.bone_pose[frame]);
+  return (points.col(4) + points.col(5)) / 2;
+}
+
+Eigen::Vector3d turned_tip(double angle) { return {-std::sin(angle), 1 + std::cos(angle), 0}; }
+
+TEST(ImportCharacter, LinearKeysTurnAtConstantSpeed) {
+  const TemporaryDirectory directory;
+  const std::string path = TinyGltf{}.write(directory.path());
+  for (const double fraction : {0.0, 0.25, 0.5, 1.0}) {
+    EXPECT_LT((tip_at(path, fraction) - turned_tip(fraction * std::numbers::pi / 2)).norm(), 1e-6) << fraction;
+  }
+}
+
+TEST(ImportCharacter, StepKeysHoldUntilTheNext) {
+  const TemporaryDirectory directory;
+  TinyGltf file;
+  file.interpolation = "STEP";
+  const std::string path = file.write(directory.path());
+  EXPECT_LT((tip_at(path, 0.95) - turned_tip(0)).norm(), 1e-6);
+  EXPECT_LT((tip_at(path, 1) - turned_tip(std::numbers::pi / 2)).norm(), 1e-6);
+}
+
+TEST(ImportCharacter, CubicKeysFollowTheirTangents) {
+  const TemporaryDirectory directory;
+  TinyGltf file;
+  file.interpolation = "CUBICSPLINE";
+  // In-tangent, value, out-tangent of two equal keys: midway the z component is 1/8 of the tangents' difference.
+  const float slope = 4;
+  file.rotations = {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, slope, 0, 0, 0, -slope, 0, 0, 0, 0, 1, 0, 0, 0, 0};
+  const double half_angle = std::atan2(slope / 8 + slope / 8, 1);
+  EXPECT_LT((tip_at(file.write(directory.path()), 0.5) - turned_tip(2 * half_angle)).norm(), 1e-6);
+}
+
+TEST(ImportCharacter, NormalisedBytesWeighAsTheirFractions) {
+  const TemporaryDirectory directory;
+  TinyGltf file;
+  file.weights_of_high = {0, 0, 0.4f, 0.4f, 1, 1};  // 102 of 255
+  const retarget::Character in_floats = import_character(file.write(directory.path()), "", {});
+  file.weights_as_bytes = true;
+  const retarget::Character in_bytes = import_character(file.write(directory.path()), "", {});
+  for (std::size_t f = 0; f < in_floats.clip.bone_pose.size(); ++f) {
+    const Eigen::Matrix3Xd a = skin_positions(in_floats.skeleton, in_floats.skin, in_floats.clip.bone_pose[f]);
+    const Eigen::Matrix3Xd b = skin_positions(in_bytes.skeleton, in_bytes.skin, in_bytes.clip.bone_pose[f]);
+    ASSERT_LT((a - b).norm(), 1e-6);
+  }
+}
+
+TEST(ImportCharacter, BindPoseTakesTheSizeOfTheFirstFrame) {
+  const TemporaryDirectory directory;
+  TinyGltf file;
+  file.scale_of_root = 0.25f;
+  const retarget::Character character = import_character(file.write(directory.path()), "", {});
+  EXPECT_NEAR(character.skin.vertices.row(1).maxCoeff(), 0.5, 1e-9);  // 2 m in the file
+  EXPECT_LT((character.clip.bone_pose.front()[1].matrix() - character.skeleton.bind_pose[1].matrix()).norm(), 1e-6);
+}
+
+TEST(ImportCharacter, VerticesWithoutWeightsGoWithTheNearestBoneAndAreTold) {
+  const TemporaryDirectory directory;
+  TinyGltf file;
+  file.vertices_without_weights = {4, 5};
+  std::vector<std::string> warnings;
+  const retarget::Character character = import_character(file.write(directory.path()), "", {}, &warnings);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings.front().find("2 vertices have no skin weights"), std::string::npos) << warnings.front();
+  for (const std::size_t v : {4u, 5u}) {
+    ASSERT_EQ(character.skin.skin_weights[v].size(), 1u);
+    EXPECT_EQ(character.skeleton.names[static_cast<std::size_t>(character.skin.skin_weights[v].front().bone)], "high");
+  }
+}
+
+struct Refusal {
+  const char* name;
+  void (*spoil)(TinyGltf&);
+  const char* place;  // part of Error::where
+  const char* what;   // part of what()
+};
+
+class RefusedGltf : public testing::TestWithParam<Refusal> {};
+
+TEST_P(RefusedGltf, IsToldWithPlaceAndMend) {
+  const TemporaryDirectory directory;
+  TinyGltf file;
+  GetParam().spoil(file);
+  const std::string path = file.write(directory.path());
+  const Error error = error_of([&] { inspect(path); });
+  EXPECT_EQ(error.file, path);
+  EXPECT_NE(error.where.find(GetParam().place), std::string::npos) << error.where;
+  EXPECT_NE(std::string(error.what()).find(GetParam().what), std::string::npos) << error.what();
+  EXPECT_FALSE(error.mend.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Import, RefusedGltf,
+    testing::Values(Refusal{"NoBindMatrices", [](TinyGltf& file) { file.with_bind_matrices = false; }, "skin",
+                            "no inverse bind matrices"},
+                    Refusal{"NoSkin", [](TinyGltf& file) { file.with_skin = false; }, "skeleton", "no mesh is bound"},
+                    Refusal{"NoWeights", [](TinyGltf& file) { file.vertices_without_weights = {0, 1, 2, 3, 4, 5}; },
+                            "skeleton", "no mesh is bound"},
+                    Refusal{"OneKey",
+                            [](TinyGltf& file) {
+                              file.key_times = {0}, file.rotations = {0, 0, 0, 1};
+                            },
+                            "clips", "zero length"},
+                    Refusal{"TooFewValues",
+                            [](TinyGltf& file) {
+                              file.rotations = {0, 0, 0, 1};
+                            },
+                            "node 'high'", "1 values for 2 key times"},
+                    Refusal{"ShortCubic", [](TinyGltf& file) { file.interpolation = "CUBICSPLINE"; }, "node 'high'",
+                            "2 values for 2 key times"},
+                    Refusal{"Descending",
+                            [](TinyGltf& file) {
+                              file.key_times = {1, 0};
+                            },
+                            "clip 'bow'", "do not ascend"},
+                    Refusal{"NotFinite",
+                            [](TinyGltf& file) {
+                              file.key_times = {0, NAN};
+                            },
+                            "clip 'bow'", "not a finite number"},
+                    Refusal{"ZeroQuaternion", [](TinyGltf& file) { file.rotations = {0, 0, 0, 1, 0, 0, 0, 0}; },
+                            "node 'high'", "zero quaternion"}),
+    [](const auto& refusal) { return std::string(refusal.param.name); });
+
+TEST(ImportCharacter, AnUnknownClipIsToldWithThoseThatExist) {
+  const Error error = error_of([] { import_character(kSamples + "/worm_crawl.glb", "gallop", {}); });
+  EXPECT_EQ(error.where, "clip 'gallop'");
+  EXPECT_NE(error.mend.find("0 'Animation'"), std::string::npos) << error.mend;
+}
+
+// --- the command
+
+TEST(InfoCommand, TellsTheSchemaOfTheContract) {
+  const Outcome outcome = run("info " + kSamples + "/boxdog_trot.fbx --json");
+  ASSERT_EQ(outcome.exit_code, 0);
+  const nlohmann::json json = nlohmann::json::parse(outcome.text);
+  EXPECT_EQ(json.at("schema"), "hydrostat.info/1");
+  EXPECT_EQ(json.at("format"), "fbx");
+  EXPECT_DOUBLE_EQ(json.at("metres_per_unit"), 0.01);
+  EXPECT_EQ(json.at("up"), "y");
+  EXPECT_TRUE(json.at("meshes").at(0).at("skinned"));
+  EXPECT_EQ(json.at("meshes").at(0).at("triangles"), 3390);
+  for (const char* field : {"name", "parent", "weighted"}) EXPECT_TRUE(json.at("bones").at(0).contains(field)) << field;
+  const nlohmann::json& clip = json.at("clips").at(0);
+  for (const char* field : {"index", "name", "duration_s", "range_s", "rate_hz", "loop", "in_place", "speed_m_s"}) {
+    EXPECT_TRUE(clip.contains(field)) << field;
+  }
+  EXPECT_EQ(clip.at("bbox").at(1).at("fraction"), 0.15);
+  EXPECT_EQ(clip.at("bbox").at(1).at("min").size(), 3u);
+  EXPECT_TRUE(json.at("warnings").is_array());
+}
+
+TEST(InfoCommand, RefusesBadInputWithOneSentenceAndExitCodeOne) {
+  const TemporaryDirectory directory;
+  const std::string prose = write_file(directory.path() + "/notes.fbx", "This is no clip.\n");
+  const std::vector<std::pair<std::string, std::string>> refused{
+      {directory.path() + "/missing.glb", "there is no such file"},
+      {directory.path(), "it is not a file"},
+      {prose, "it cannot be read"},
+      {write_file(directory.path() + "/notes.glb", "This is no clip.\n"), "no whole glTF"},
+      {write_file(directory.path() + "/empty.fbx", ""), "it is empty"},
+      {write_file(directory.path() + "/notes.txt", "This is no clip.\n"), "no known kind of clip file"}};
+  for (const auto& [path, what] : refused) {
+    const Outcome outcome = run("info '" + path + "'");
+    EXPECT_EQ(outcome.exit_code, 1) << path;
+    EXPECT_EQ(outcome.text.find(path + ": "), 0u) << outcome.text;
+    EXPECT_NE(outcome.text.find(what), std::string::npos) << outcome.text;
+    EXPECT_EQ(std::count(outcome.text.begin(), outcome.text.end(), '\n'), 1) << outcome.text;
+  }
+}
+
+TEST(InfoCommand, RefusesAnUnknownOptionWithExitCodeTwo) {
+  EXPECT_EQ(run("info " + kSamples + "/worm_crawl.glb --jsn").exit_code, 2);
+  EXPECT_EQ(run("info").exit_code, 2);
+}
+
+// --- clips that others made
+
+struct GoldenFile {
+  std::string name;
+  double tolerance;  // relative to the largest extent
+};
+std::ostream& operator<<(std::ostream& out, const GoldenFile& file) { return out << file.name; }
+
+/// Files with golden boxes and how near ours are. Above 0.3 %: Euler curves between sparse keys are lost in assimp.
+std::vector<GoldenFile> golden_files() {
+  if (assets().empty()) return {};
+  std::vector<GoldenFile> files;
+  for (const char* name : {"gltf/fox.glb",
+                           "gltf/snake.glb",
+                           "gltf/cesium_man.gltf",
+                           "gltf/rigged_simple.gltf",
+                           "gltf/rigged_simple_u8_weights.gltf",
+                           "gltf/simple_skin_step.gltf",
+                           "gltf/spider_animated.gltf",
+                           "gltf/greenman.glb",
+                           "gltf/platformer_enemy.glb",
+                           "fbx/slime.fbx",
+                           "fbx/manta_ray.fbx",
+                           "fbx/blender_sausage_unit100.fbx",
+                           "fbx/animation_with_skeleton.fbx",
+                           "collada/cowboy.dae",
+                           "collada/cylinder_animated_from_3ds_max.dae",
+                           "made/worm_crawl.fbx",
+                           "made/worm_crawl.glb",
+                           "made/worm_crawl_zup_units.fbx",
+                           "made/boxdog_trot.fbx",
+                           "made/boxdog_trot.glb",
+                           "made/boxdog_trot.dae",
+                           "made/boxdog_jump.fbx",
+                           "made/boxdog_jump.glb",
+                           "made/boxdog_two_clips.fbx"}) {
+    files.push_back({name, 0.003});
+  }
+  for (const char* name :
+       {"fbx/frog.fbx", "fbx/alien_14_clips.fbx", "fbx/robot_same_names.fbx", "fbx/maya_sausage_3_takes.fbx"}) {
+    files.push_back({name, 0.0121});
+  }
+  std::erase_if(files, [](const GoldenFile& file) { return !std::filesystem::exists(assets() + "/" + file.name); });
+  return files;
+}
+
+/// Golden FBX boxes are in the file's units and axes.
+Box in_metres_y_up(const nlohmann::json& numbers, double metres_per_unit, bool z_up) {
+  Box box;
+  for (std::size_t i = 0; i < 6; ++i) box[i] = metres_per_unit * numbers.at(i).get<double>();
+  return z_up ? Box{box[0], box[2], -box[4], box[3], box[5], -box[1]} : box;
+}
+
+class GoldenClip : public testing::TestWithParam<GoldenFile> {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(GoldenClip);
+
+TEST_P(GoldenClip, StandsWhereOtherReadersSeeIt) {
+  const nlohmann::json golden =
+      nlohmann::json::parse(std::ifstream(assets() + "/golden_bbox.json")).at("files").at(GetParam().name);
+  const FileInfo info = inspect(assets() + "/" + GetParam().name);
+  ASSERT_EQ(info.clips.size(), golden.at("clips").size());
+  const bool z_up = golden.at("axes") != "Y up" && info.up == "z";
+  for (std::size_t c = 0; c < info.clips.size(); ++c) {
+    const nlohmann::json& wanted = golden.at("clips").at(c);
+    SCOPED_TRACE("clip " + info.clips[c].name);
+    EXPECT_EQ(info.clips[c].name, wanted.at("name").get<std::string>());
+    EXPECT_NEAR(info.clips[c].duration_s, wanted.at("duration_s").get<double>(), 1e-3);
+    for (std::size_t f = 0; f < info.clips[c].bbox.size(); ++f) {
+      EXPECT_LT(misfit(info.clips[c].bbox[f], in_metres_y_up(wanted.at("bbox").at(f), golden.at("metres_per_unit"), z_up)),
+                GetParam().tolerance)
+          << "fraction " << info.clips[c].bbox[f].fraction;
+    }
+  }
+}
+
+TEST_P(GoldenClip, SkinningTheCharacterKeepsTheFirstBox) {
+  const std::string path = assets() + "/" + GetParam().name;
+  const FileInfo info = inspect(path);
+  const retarget::Character character = import_character(path, "", {});
+  const ClipInfo& clip = info.clips[static_cast<std::size_t>(character.clip.index)];
+  const Box first = box_of(skin_positions(character.skeleton, character.skin, character.clip.bone_pose.front()));
+  // Before the first key the clip holds still.
+  EXPECT_LT(misfit(clip.bbox.front(), first), 1e-5);
+}
+
+std::string test_name(const testing::TestParamInfo<GoldenFile>& file) {
+  std::string name = file.param.name;
+  std::replace_if(
+      name.begin(), name.end(), [](char letter) { return letter == '/' || letter == '.'; }, '_');
+  return name;
+}
+INSTANTIATE_TEST_SUITE_P(ThirdParty, GoldenClip, testing::ValuesIn(golden_files()), test_name);
+
+/// The same motion in centimetres and y up, in metres and z up, and as glTF.
+class SameWorm : public testing::TestWithParam<GoldenFile> {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(SameWorm);
+
+TEST_P(SameWorm, MovesAlikeInEveryUnitAxisAndFormat) {
+  const retarget::Character ours = import_character(kSamples + "/worm_crawl.glb", "", {});
+  const retarget::Character other = import_character(assets() + "/" + GetParam().name, "", {});
+  ASSERT_EQ(ours.clip.frames(), other.clip.frames());
+  EXPECT_EQ(ours.skin.vertices.cols(), other.skin.vertices.cols());
+  const Box bind = box_of(ours.skin.vertices), other_bind = box_of(other.skin.vertices);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(bind[i], other_bind[i], 1e-4);  // [m]
+  for (std::size_t f = 0; f < ours.clip.bone_pose.size(); f += 7) {
+    const Box a = box_of(skin_positions(ours.skeleton, ours.skin, ours.clip.bone_pose[f]));
+    const Box b = box_of(skin_positions(other.skeleton, other.skin, other.clip.bone_pose[f]));
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(a[i], b[i], 2e-4) << "frame " << f;  // [m]
+  }
+}
+
+std::vector<GoldenFile> worms() {
+  std::vector<GoldenFile> files;
+  for (const GoldenFile& file : golden_files()) {
+    if (file.name.find("worm_crawl") != std::string::npos) files.push_back(file);
+  }
+  return files;
+}
+INSTANTIATE_TEST_SUITE_P(ThirdParty, SameWorm, testing::ValuesIn(worms()), test_name);
+
+/// Files that end or mislead the library which reads them.
+std::vector<GoldenFile> hostile_files() {
+  std::vector<GoldenFile> files;
+  for (const char* name :
+       {"broken/assert_abort.fbx", "broken/Animation_Skin_04.gltf", "broken/fox_truncated.glb", "broken/fuzz_0100.fbx",
+        "broken/fuzz_0739.fbx", "broken/huge_count.dae", "broken/inf_nan_ascii.fbx", "broken/old_version_6100_ascii.fbx",
+        "broken/recursive_nodes.gltf", "broken/rigged_simple_bind_short.gltf", "broken/rigged_simple_cubic_too_short.gltf",
+        "broken/rigged_simple_nan_time.gltf", "broken/rigged_simple_unsorted_times.gltf", "fbx/maya_pivot_offset.fbx",
+        "gltf/AnimatedMorphCube.gltf", "gltf/interpolation_test.gltf"}) {
+    if (!assets().empty() && std::filesystem::exists(assets() + "/" + name)) files.push_back({name, 0});
+  }
+  return files;
+}
+
+class HostileFile : public testing::TestWithParam<GoldenFile> {};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(HostileFile);
+
+TEST_P(HostileFile, EndsInOneSentenceAndExitCodeOne) {
+  const std::string path = assets() + "/" + GetParam().name;
+  const Outcome outcome = run("info '" + path + "'");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.text.find(path + ": "), 0u) << outcome.text;
+  EXPECT_EQ(std::count(outcome.text.begin(), outcome.text.end(), '\n'), 1) << outcome.text;
+}
+INSTANTIATE_TEST_SUITE_P(ThirdParty, HostileFile, testing::ValuesIn(hostile_files()), test_name);
+
+}  // namespace
+}  // namespace hydrostat::io

@@ -12,4 +12,7 @@ namespace hydrostat::cli {
 /// `hydrostat info CLIP [--json]`: what the importer sees.
 void add_info(CLI::App& app, int& exit_code);
 
+/// `hydrostat signals DIR list|plot|set|gain|shift|filter|layers|reset`: activations, and the layers that edit them.
+void add_signals(CLI::App& app, int& exit_code);
+
 }  // namespace hydrostat::cli

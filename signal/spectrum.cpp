@@ -37,8 +37,8 @@ Eigen::MatrixXd end_cubic(const Eigen::Ref<const Eigen::MatrixXd>& samples) {
   const double per_phase = static_cast<double>(last) / 6;
   const Eigen::RowVectorXd start_slope =
       per_phase * (-11 * samples.row(0) + 18 * samples.row(1) - 9 * samples.row(2) + 2 * samples.row(3));
-  const Eigen::RowVectorXd end_slope =
-      per_phase * (11 * samples.row(last) - 18 * samples.row(last - 1) + 9 * samples.row(last - 2) - 2 * samples.row(last - 3));
+  const Eigen::RowVectorXd end_slope = per_phase * (11 * samples.row(last) - 18 * samples.row(last - 1) +
+                                                    9 * samples.row(last - 2) - 2 * samples.row(last - 3));
   const Eigen::RowVectorXd rise = samples.row(last) - samples.row(0);
   Eigen::MatrixXd cubic(4, samples.cols());
   cubic.row(0) = samples.row(0);

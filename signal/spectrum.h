@@ -9,7 +9,8 @@ enum class Kind { loop, one_shot };
 
 /// Coefficients of C channels, scaled so that their sum is the signal; harmonic 0 is the mean.
 ///   loop:      value(phase) = sum over k of cosine(k) cos(2 pi k phase) + sine(k) sin(2 pi k phase), phase in periods
-///   one-shot:  value(phase) = cubic(phase) + sum over k of cosine(k) cos(pi k x), phase 0 at the first sample, 1 at the last,
+///   one-shot:  value(phase) = cubic(phase) + sum over k of cosine(k) cos(pi k x), phase 0 at the first sample, 1 at the
+///   last,
 ///              x = (phase (n - 1) + 1/2) / n: the grid of the DCT-II. The cubic counts as part of harmonic 0.
 struct Spectrum {
   Kind kind = Kind::loop;
@@ -57,9 +58,9 @@ Eigen::MatrixXd synthesise_samples(const Spectrum& spectrum, int n);
 /// Root mean square of all entries of a - b; 0 where they are empty.
 double rms_difference(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::Ref<const Eigen::MatrixXd>& b);
 
-/// Makes samples ((n + 1) x C, the last row repeats the first) periodic: spreads the difference between last and first row over
-/// the period by a smooth ramp that has no slope at the ends, half of it to either end. Returns the largest difference of a
-/// channel [unit of the signal] as it was; whether that still is a loop, the caller decides.
+/// Makes samples ((n + 1) x C, the last row repeats the first) periodic: spreads the difference between last and first row
+/// over the period by a smooth ramp that has no slope at the ends, half of it to either end. Returns the largest difference
+/// of a channel [unit of the signal] as it was; whether that still is a loop, the caller decides.
 double spread_closure_defect(Eigen::Ref<Eigen::MatrixXd> samples);
 
 /// The functions that the coefficients of a spectrum multiply, one row each: cosines 0..K, then sines 0..K of a loop or the

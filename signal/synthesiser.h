@@ -6,8 +6,9 @@
 
 namespace hydrostat::signal {
 
-/// Plays a spectrum over time, held within limits. What a step loop asks for at every step is laid out beforehand: a call costs
-/// about C x 2 (K + 1) multiply-adds and allocates nothing. One per thread: a call writes to the scratch memory inside.
+/// Plays a spectrum over time, held within limits. What a step loop asks for at every step is laid out beforehand: a call
+/// costs about C x 2 (K + 1) multiply-adds and allocates nothing. One per thread: a call writes to the scratch memory
+/// inside.
 class Synthesiser {
  public:
   /// period_s [s] > 0: of a loop, or from the first to the last sample of a one-shot. Values stay within [low, high].

@@ -1,9 +1,9 @@
 #include "signal/transforms.h"
 
+#include <fftw3.h>
+
 #include <cassert>
 #include <mutex>
-
-#include <fftw3.h>
 
 namespace hydrostat::signal {
 

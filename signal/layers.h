@@ -30,8 +30,8 @@ struct PhaseRange {
 struct Selection {
   std::string channel = "*";
   std::string group = "*";
-  std::optional<Band> band;         // none: all harmonics
-  std::optional<PhaseRange> range;  // none: always
+  std::optional<Band> band = {};         // none: all harmonics
+  std::optional<PhaseRange> range = {};  // none: always
 };
 
 /// Gives one harmonic an amplitude; the selection's band has no say. The part of a loop becomes

@@ -26,10 +26,10 @@ const char* kind_name(Kind kind) { return kind == Kind::loop ? "loop" : "one_sho
 
 // ---- writing
 
-bool is_short(const Json& value) {
-  return !value.is_structured() || (value.is_array() && std::none_of(value.begin(), value.end(), [](const Json& entry) {
-                                      return entry.is_structured();
-                                    }));
+/// A list of numbers or names.
+bool is_plain_list(const Json& value) {
+  return value.is_array() &&
+         std::none_of(value.begin(), value.end(), [](const Json& entry) { return entry.is_structured(); });
 }
 
 /// One value in one line. A bone's name comes from a foreign file: bytes that are no UTF-8 become U+FFFD instead of stopping
@@ -38,8 +38,17 @@ std::string in_one_line(const Json& value) { return value.dump(-1, ' ', false, J
 
 /// JSON with one member a line and lists of numbers in one line: what a person can find a place in.
 void print(const Json& value, int depth, std::string& text) {
-  if (is_short(value) || value.empty()) {
+  if (!value.is_structured()) {
     text += in_one_line(value);
+    return;
+  }
+  if (is_plain_list(value)) {
+    const char* before = "[";
+    for (const Json& entry : value) {
+      text += before + in_one_line(entry);
+      before = ", ";
+    }
+    text += value.empty() ? "[]" : "]";
     return;
   }
   const std::string indent(static_cast<std::size_t>(2 * (depth + 1)), ' ');

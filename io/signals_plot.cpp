@@ -100,6 +100,14 @@ std::string axes(const Panel& panel, const retarget::SignalSet& set, const retar
          text_at(panel.x(1), panel.y0 + Panel::height() + 16, "end", number(set.period_s, 3) + " s");
 }
 
+std::string lines(const Panel& panel, const retarget::SignalSet& set, const retarget::BoneSignals& bone,
+                  const Eigen::MatrixXd& values, const char* style) {
+  std::string text;
+  for (const int c : bone.channels)
+    text += line(panel, values.col(c), style, set.channels[static_cast<std::size_t>(c)].name);
+  return text;
+}
+
 }  // namespace
 
 std::string signals_plot(const retarget::SignalSet& set, const retarget::EditedActivations& edited,
@@ -127,11 +135,8 @@ std::string signals_plot(const retarget::SignalSet& set, const retarget::EditedA
     const Panel panel{static_cast<double>(place % kColumns * kPanelWidth + kLeft),
                       static_cast<double>(kTitle + place / kColumns * kPanelHeight + kTop), low - margin, high + margin};
     text += axes(panel, set, bones[b]);
-    for (const int c : bones[b].channels) {
-      const std::string& name = set.channels[static_cast<std::size_t>(c)].name;
-      if (!set.layers.empty()) text += line(panel, solved.col(c), "solved", name);
-      text += line(panel, now.col(c), "now", name);
-    }
+    if (!set.layers.empty()) text += lines(panel, set, bones[b], solved, "solved");
+    text += lines(panel, set, bones[b], now, "now");
   }
   return text + "</svg>\n";
 }

@@ -18,8 +18,7 @@ Synthesiser::Synthesiser(const Spectrum& spectrum, double period_s, double low, 
 Eigen::Index Synthesiser::at(double time_s, Eigen::Ref<Eigen::VectorXd> values) {
   assert(values.size() == channels());
   basis_.fill_values(time_s / period_s_, basis_values_);
-  values = coefficients_.col(0) * basis_values_[0];
-  for (Eigen::Index r = 1; r < coefficients_.cols(); ++r) values += coefficients_.col(r) * basis_values_[r];
+  values.noalias() = coefficients_ * basis_values_;
   return clip_to_limits(values, low_, high_);
 }
 

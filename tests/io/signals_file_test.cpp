@@ -166,6 +166,16 @@ TEST(SignalsFile, RefusesBadFilesWithFilePlaceAndMend) {
   }
 }
 
+TEST(SignalsFile, NamesThatAreNoUtf8StopNobody) {
+  SignalSet set = random_signals(1, Kind::loop);
+  set.channels[0].group =
+      "h\xfc"
+      "fte";
+  EXPECT_EQ(parse_signals(signals_text(set), "signals.json").channels[0].group,
+            "h\xef\xbf\xbd"
+            "fte");
+}
+
 TEST(SignalsFile, RefusesTwoChannelsOfOneName) {
   SignalSet set = random_signals(1, Kind::loop);
   set.channels[2].name = set.channels[0].name;

@@ -45,16 +45,24 @@ int write_and_sync(const std::filesystem::path& file, std::string_view bytes) {
 const char* mend_of_write_error(int error_number) {
   switch (error_number) {
     case ENOSPC:
-    case EDQUOT: return "Free space on the disk, or write elsewhere.";
-    case EFBIG: return "Raise the limit on file sizes (ulimit -f), or write elsewhere.";
+    case EDQUOT:
+      return "Free space on the disk, or write elsewhere.";
+    case EFBIG:
+      return "Raise the limit on file sizes (ulimit -f), or write elsewhere.";
     case EACCES:
-    case EPERM: return "Give yourself permission to write there, or write elsewhere.";
-    case EROFS: return "The file system is read-only; write elsewhere.";
+    case EPERM:
+      return "Give yourself permission to write there, or write elsewhere.";
+    case EROFS:
+      return "The file system is read-only; write elsewhere.";
     case ENOTDIR:
-    case EEXIST: return "A file stands where a directory is needed; move it away, or write elsewhere.";
-    case EISDIR: return "A directory stands where the file belongs; move it away, or write elsewhere.";
-    case ENAMETOOLONG: return "Give a shorter name.";
-    default: return "Check the path and the disk, or write elsewhere.";
+    case EEXIST:
+      return "A file stands where a directory is needed; move it away, or write elsewhere.";
+    case EISDIR:
+      return "A directory stands where the file belongs; move it away, or write elsewhere.";
+    case ENAMETOOLONG:
+      return "Give a shorter name.";
+    default:
+      return "Check the path and the disk, or write elsewhere.";
   }
 }
 

@@ -6,8 +6,9 @@
 
 namespace hydrostat::io {
 
-/// Writes a file whole or not at all: the bytes go to "<file>.part", reach the disk, and are renamed. Directories that are missing
-/// are made. Throws Error that names `shown_as` and the cause (full disk, no permission, a directory in the way) and leaves no part.
+/// Writes a file whole or not at all: the bytes go to "<file>.part", reach the disk, and are renamed. Directories that are
+/// missing are made. Throws Error that names `shown_as` and the cause (full disk, no permission, a directory in the way) and
+/// leaves no part.
 void write_file(const std::filesystem::path& file, std::string_view bytes, const std::filesystem::path& shown_as);
 void write_file(const std::filesystem::path& file, std::string_view bytes);
 

@@ -1,1 +1,0 @@
-namespace hydrostat::signal { extern const char* const kKinds; const char* const kKinds = "loop one_shot"; }

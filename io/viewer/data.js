@@ -1,7 +1,10 @@
 // What the page holds, decoded, and the motions as functions of time.
 
 function bytes(base64) {
-  return Uint8Array.from(atob(base64), (c) => c.charCodeAt(0)).buffer;
+  const text = atob(base64);
+  const result = new Uint8Array(text.length);
+  for (let i = 0; i < result.length; ++i) result[i] = text.charCodeAt(i);
+  return result.buffer;
 }
 
 export const floats = (text) => new Float32Array(bytes(text));

@@ -1,6 +1,6 @@
 // The view: skins of the motions over a ground with a grid in metres.
 import {
-  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, Group, HemisphereLight,
+  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, HemisphereLight,
   LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshStandardMaterial, PCFSoftShadowMap, PerspectiveCamera,
   PlaneGeometry, Scene, Vector3, WebGLRenderer,
 } from 'three';
@@ -47,21 +47,31 @@ function heading_of(motion, length) {
   return width_along(positions, [1, 0]) >= width_along(positions, [0, 1]) ? [1, 0] : [0, 1];
 }
 
-function lines(positions, colour, opacity) {
-  const geometry = new BufferGeometry();
-  geometry.setAttribute('position', new BufferAttribute(new Float32Array(positions), 3));
-  return new LineSegments(geometry, new LineBasicMaterial({ color: colour, transparent: true, opacity, depthWrite: false }));
-}
-
-/** Lines of a square grid of `half` steps to either side of the origin; every tenth is left to the coarser grid. */
-function grid_lines(step, half, is_fine) {
-  const positions = [];
-  for (let i = -half; i <= half; ++i) {
-    if (is_fine && i % 10 === 0) continue;
-    positions.push(i * step, 0, -half * step, i * step, 0, half * step);
-    positions.push(-half * step, 0, i * step, half * step, 0, i * step);
-  }
-  return positions;
+/** A floor with lines every `step` metres and finer ones every tenth, drawn in its shader: lines of geometry would fight its depth. */
+function grid_material(step, lines) {
+  const material = new MeshLambertMaterial();
+  material.onBeforeCompile = (shader) => {
+    Object.assign(shader.uniforms, { grid_step: { value: step }, grid_colour: { value: lines } });
+    shader.vertexShader = shader.vertexShader
+      .replace('#include <common>', '#include <common>\nvarying vec3 world_place;')
+      .replace('#include <begin_vertex>', '#include <begin_vertex>\nworld_place = (modelMatrix * vec4(position, 1.0)).xyz;');
+    shader.fragmentShader = shader.fragmentShader
+      .replace('#include <common>', `#include <common>
+        varying vec3 world_place;
+        uniform float grid_step;
+        uniform vec3 grid_colour;
+        float line_share(float spacing, float pixels) {
+          vec2 place = world_place.xz / spacing;
+          vec2 width = fwidth(place);
+          vec2 away = abs(fract(place - 0.5) - 0.5) / width;
+          vec2 share = clamp(pixels - away, 0.0, 1.0) * clamp(1.0 - 2.5 * width, 0.0, 1.0);
+          return max(share.x, share.y);
+        }`)
+      .replace('#include <color_fragment>', `#include <color_fragment>
+        float share = max(0.55 * line_share(grid_step, 1.2), 0.25 * line_share(0.1 * grid_step, 1.0));
+        diffuseColor.rgb = mix(diffuseColor.rgb, grid_colour, share);`);
+  };
+  return material;
 }
 
 export class Stage {
@@ -81,7 +91,7 @@ export class Stage {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFSoftShadowMap;
     this.scene = new Scene();
-    this.camera = new PerspectiveCamera(35, 1, 0.01 * this.length, 200 * this.length);
+    this.camera = new PerspectiveCamera(35, 1, 0.05 * this.length, 60 * this.length);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 0.495 * Math.PI;
     this.controls.addEventListener('change', () => this.draw());
@@ -108,16 +118,12 @@ export class Stage {
 
   add_ground() {
     this.grid_step = 10 ** Math.round(Math.log10(this.length));
-    this.ground = new Group();
-    this.floor = new Mesh(new PlaneGeometry(400 * this.length, 400 * this.length), new MeshLambertMaterial());
+    this.line_colour = new Color();
+    const extent = 120 * this.length;
+    this.floor = new Mesh(new PlaneGeometry(extent, extent), grid_material(this.grid_step, this.line_colour));
     this.floor.rotation.x = -Math.PI / 2;
-    this.floor.position.y = -1e-4 * this.length; // under the lines
     this.floor.receiveShadow = true;
-    this.coarse = lines(grid_lines(this.grid_step, 40, false), 0x000000, 0.5);
-    this.fine = lines(grid_lines(this.grid_step / 10, 100, true), 0x000000, 0.18);
-    this.ground.add(this.floor, this.coarse, this.fine);
-    this.ground.position.y = this.ground_height;
-    this.scene.add(this.ground);
+    this.scene.add(this.floor);
   }
 
   add_body(motion) {
@@ -156,7 +162,7 @@ export class Stage {
   set_distance() {
     // A narrow view needs more distance to hold the body's length.
     const room = Math.max(1, 1.25 / this.camera.aspect);
-    const distance = this.length * (this.view === 'side' ? 3.6 : 2.5) * room;
+    const distance = this.length * (this.view === 'side' ? 3.4 : 2.3) * room;
     this.camera.position.copy(this.controls.target).addScaledVector(this.camera_way, distance);
     this.controls.update();
   }
@@ -171,7 +177,7 @@ export class Stage {
     this.scene.background = background;
     this.scene.fog = new Fog(background, 6 * this.length, 22 * this.length);
     this.floor.material.color.set(colours.floor);
-    for (const grid of [this.coarse, this.fine]) grid.material.color.set(colours.grid);
+    this.line_colour.set(colours.grid);
   }
 
   resize() {
@@ -244,7 +250,7 @@ export class Stage {
     colour.needsUpdate = true;
   }
 
-  /** Camera, light and grid go with the replay. */
+  /** Camera, light and floor go with the replay; the floor's grid stays in the world. */
   follow(t) {
     if (!this.leader) return;
     const [x, , z] = centre(this.leader.at(t));
@@ -255,9 +261,8 @@ export class Stage {
       this.camera.position.add(move);
       this.camera.lookAt(this.controls.target);
     }
-    const snap = (value) => Math.round(value / this.grid_step) * this.grid_step;
     const seen = this.controls.target;
-    this.ground.position.set(snap(seen.x), this.ground_height, snap(seen.z));
+    this.floor.position.set(seen.x, this.ground_height, seen.z);
     this.sun.target.position.copy(seen);
     this.sun.position.copy(seen).add(new Vector3(1.2, 4, 1.6).multiplyScalar(this.length));
   }

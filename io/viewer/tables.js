@@ -3,7 +3,7 @@
 const kUnits = [
   ['_rms_length', 100, '% L'], ['_per_cycle_length', 100, '% L'], ['_length', 100, '% L'], ['_max_size', 100, '% D'], ['_size', 100, '% D'],
   ['_l0', 100, '% l0'], ['_mgl', 1, 'mgL'], ['_mg', 1, 'mg'], ['_deg_per_cycle', 1, 'deg'], ['_kg', 1, 'kg'], ['_pa', 1, 'Pa'],
-  ['_hz', 1, 'Hz'], ['_ms_per_sim_s', 1, 'ms/s'], ['_m', 1, 'm'], ['_s', 1, 's'],
+  ['_hz', 1, 'Hz'], ['_ms_per_sim_s', 1, 'ms/s'], ['_time_factor', 1, '×'], ['_m', 1, 'm'], ['_s', 1, 's'],
 ];
 const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_rms', 'correction_rms']);
 const kNames = {
@@ -72,7 +72,8 @@ function add_metrics(parent, replay) {
     element(row, 'th', '', name_of(key)).title = key;
     for (const [run] of runs) {
       const cell = element(row, 'td', '', text_of(key, replay[run]?.[key]));
-      if (key === 'fell' && replay[run]?.fell) cell.className = 'is_bad';
+      cell.classList.toggle('is_bad', key === 'fell' && replay[run]?.fell === true);
+      cell.classList.toggle('words', key === 'fall_cause');
     }
   }
 }
@@ -114,19 +115,21 @@ function add_timing(parent, timing) {
 }
 
 export function add_tables(parent, report) {
+  const main = element(parent, 'div');
+  const details = element(parent, 'div', 'details');
   if (report.warnings.length > 0) {
-    const list = element(section(parent, 'Warnings'), 'ul', 'warnings');
+    const list = element(section(main, 'Warnings'), 'ul', 'warnings');
     for (const warning of report.warnings) element(list, 'li', '', warning);
   }
-  add_metrics(parent, report.replay);
-  add_effects(parent, report.effects);
+  add_metrics(main, report.replay);
+  add_effects(main, report.effects);
+  add_timing(main, report.timing_s);
   const groups = [
     ['Preparation of the target', report.preparation], ['Inverse dynamics', report.inverse], ['Signals', report.signals],
     ['Body', { ...report.body, coupling_error_rms_length: report.coupling.error_rms_length }], ['Accuracy', report.accuracy],
     ['Source', report.source],
   ];
-  for (const [title, group] of groups) add_group(parent, title, group);
-  add_timing(parent, report.timing_s);
+  for (const [title, group] of groups) add_group(details, title, group);
 }
 
 /** What to say above everything: null when the run did what was asked. */

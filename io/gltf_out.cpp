@@ -123,8 +123,7 @@ retarget::Motion with_closing_frame(const retarget::Motion& motion) {
   retarget::Motion closed = motion;
   closed.loop = false;
   closed.frames.conservativeResize(Eigen::NoChange, motion.count() + 1);
-  const Eigen::AngleAxisd turn(motion.yaw, Eigen::Vector3d::UnitY());
-  closed.at(motion.count()) = (turn.toRotationMatrix() * motion.at(0)).colwise() + motion.travel;
+  closed.at(motion.count()) = retarget::after_cycles(motion, 1) * Eigen::Matrix3Xd(motion.at(0));
   return closed;
 }
 
@@ -248,7 +247,7 @@ void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& sk
   constexpr int kMostJoints = std::numeric_limits<unsigned short>::max() + 1;
   if (body.node_count() > kMostJoints) {
     throw Error(path.string(), "control mesh", std::to_string(body.node_count()) + " nodes are more than glTF can number as joints",
-                "Ask for at most " + std::to_string(kMostJoints) + " with --nodes.");
+                "Ask for at most " + std::to_string(kMostJoints) + " with --nodes");
   }
 
   tinygltf::Model model;

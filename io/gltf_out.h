@@ -25,7 +25,8 @@ struct EmbeddedSkin {
 /// position, and one rotation R common to all joints, the best fit of the control mesh to its rest shape (weighted by the node
 /// masses, N, [kg]). With the inverse bind matrices translate(-X) linear blend skinning gives
 ///   v = R (v_bind - sum w X) + sum w x,
-/// the embedded position exactly, between keys too, for v_bind is the same weighted sum of rest nodes; R turns the normals.
+/// the embedded position exactly, between keys too, where v_bind is the same weighted sum of rest nodes; what the embedding
+/// misses it by turns with R, as the normals do.
 /// A loop gets its first frame, moved on by one period, as last key. Numbers are float32. Throws Error when the file cannot be
 /// written, or for a body of more than 65536 nodes (glTF's joint indices).
 void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& skin, const retarget::ControlMesh& body,

@@ -69,10 +69,10 @@ std::vector<std::size_t> read_shape(std::string_view text) {
 template <typename Number>
 NpyArray<Number> read(const std::filesystem::path& path) {
   const auto refuse = [&](const std::string& what) {
-    return Error(path.string(), "header", what, "Give a file that hydrostat's --trace wrote.");
+    return Error(path.string(), "header", what, "Give a file that hydrostat's --trace wrote");
   };
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw Error(path.string(), "input", "the file cannot be opened", "Check its name.");
+  if (!stream) throw Error(path.string(), "input", "the file cannot be opened", "Check its name");
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (bytes.size() < kPreamble || bytes.compare(0, kMagic.size(), kMagic) != 0) throw refuse("not a NumPy file of format 1.0");
   const std::size_t header_size = static_cast<unsigned char>(bytes[8]) + 256u * static_cast<unsigned char>(bytes[9]);

@@ -91,7 +91,7 @@ Json motion_json(const PageMotion& shown) {
   json["of_skin"] = shown.of_skin;
   json["rate_hz"] = motion.rate_hz / static_cast<double>(stride);
   json["loop"] = motion.loop;
-  json["duration_s"] = motion.loop ? motion.period_s() : static_cast<double>(motion.count() - 1) / motion.rate_hz;
+  json["duration_s"] = motion.duration_s();
   json["travel"] = {motion.travel.x(), motion.travel.y(), motion.travel.z()};
   json["yaw"] = motion.yaw;
   return json;
@@ -112,7 +112,9 @@ Json chart_json(const PageChart& chart) {
 
 Json contact_json(const PageContactRow& row) {
   std::string states;
-  for (PageContact state : row.states) states += state == PageContact::kStick ? 'S' : state == PageContact::kSlide ? 'L' : '.';
+  for (retarget::ContactState state : row.states) {
+    states += state == retarget::ContactState::kStick ? 'S' : state == retarget::ContactState::kSlide ? 'L' : '.';
+  }
   return {{"patch", row.patch}, {"role", role_name(row.role)}, {"rate_hz", row.rate_hz}, {"loop", row.loop}, {"states", states}};
 }
 

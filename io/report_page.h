@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "retarget/clip.h"
+#include "retarget/contacts.h"
 #include "retarget/control_mesh.h"
 #include "retarget/motion.h"
 #include "retarget/run_report.h"
@@ -35,15 +36,13 @@ struct PageChart {
   std::vector<PageCurve> curves;
 };
 
-enum class PageContact { kOff, kSlide, kStick };
-
 /// One row of the contact timeline: state s holds from s / rate_hz on. A loop starts again after its last.
 struct PageContactRow {
   std::string patch;         // "left front foot"
   PageRole role = PageRole::kTarget;
   double rate_hz = 60;
   bool loop = false;
-  std::vector<PageContact> states;
+  std::vector<retarget::ContactState> states;
 };
 
 struct PageInput {

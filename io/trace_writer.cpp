@@ -38,9 +38,9 @@ void write_arrays(const fs::path& folder, const retarget::Trace& trace) {
 
 void refuse_other_things(const fs::path& folder) {
   if (!fs::exists(folder)) return;
-  if (!fs::is_directory(folder)) throw Error(folder.string(), "--trace", "a file of this name stands there", "Name another folder.");
+  if (!fs::is_directory(folder)) throw Error(folder.string(), "--trace", "a file of this name stands there", "Name another folder");
   if (!fs::is_empty(folder) && !fs::exists(folder / "time.npy")) {
-    throw Error(folder.string(), "--trace", "the folder holds something that is not a trace", "Name an empty or a new folder.");
+    throw Error(folder.string(), "--trace", "the folder holds something that is not a trace", "Name an empty or a new folder");
   }
 }
 
@@ -62,7 +62,7 @@ void write_trace(const fs::path& folder, const retarget::Trace& trace) {
     std::error_code ignored;
     fs::remove_all(part, ignored);
     throw Error(place.string(), "--trace", "the folder cannot be written: " + failure.code().message(),
-                "Name a folder that you may write to.");
+                "Name a folder that you may write to");
   } catch (const Error&) {
     std::error_code ignored;
     fs::remove_all(part, ignored);

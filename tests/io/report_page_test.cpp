@@ -134,13 +134,13 @@ struct WobblingBar {
           {"muscle " + std::to_string(muscle), PageRole::kOther, time, 1 + 0.1 * (6 * time.array() + muscle).sin()});
     }
     for (const char* patch : {"left fore foot", "right fore foot", "belly"}) {
-      std::vector<PageContact> states(60, PageContact::kOff);
-      std::fill_n(states.begin() + 5, 25, PageContact::kStick);
-      std::fill_n(states.begin() + 30, 10, PageContact::kSlide);
+      std::vector<retarget::ContactState> states(60, retarget::ContactState::kOff);
+      std::fill_n(states.begin() + 5, 25, retarget::ContactState::kStick);
+      std::fill_n(states.begin() + 30, 10, retarget::ContactState::kSlide);
       input.contacts.push_back({patch, PageRole::kTarget, kRate, true, states});
-      std::vector<PageContact> replayed;
+      std::vector<retarget::ContactState> replayed;
       for (int k = 0; k < 5; ++k) replayed.insert(replayed.end(), states.begin(), states.end());
-      replayed.insert(replayed.begin(), 3, PageContact::kOff);
+      replayed.insert(replayed.begin(), 3, retarget::ContactState::kOff);
       input.contacts.push_back({patch, PageRole::kReplay, kRate, false, replayed});
     }
     return input;

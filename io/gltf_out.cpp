@@ -10,7 +10,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "io/whole_file.h"
+#include "io/write_file.h"
 #include "retarget/best_fit_rotation.h"
 #include "retarget/error.h"
 
@@ -105,7 +105,8 @@ JointWeights joint_weights(const retarget::Embedding& embedding) {
   JointWeights result;
   for (Eigen::Index v = 0; v < embedding.weights.cols(); ++v) {
     std::array<int, 4> order{0, 1, 2, 3};
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return embedding.weights(a, v) > embedding.weights(b, v); });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return embedding.weights(a, v) > embedding.weights(b, v); });
     std::array<float, 4> weights{};
     for (std::size_t k = 1; k < 4; ++k) weights[k] = static_cast<float>(std::max(0.0, embedding.weights(order[k], v)));
     weights[0] = 1.0f - (weights[1] + (weights[2] + weights[3]));
@@ -132,19 +133,21 @@ void add_mesh(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& 
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
   primitive.material = 0;
   const std::vector<float> positions = floats(skin.vertices);
-  const int position = buffer.array(positions, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
+  const int position =
+      buffer.array(positions, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
   buffer.set_bounds(position, positions);
   primitive.attributes["POSITION"] = position;
-  primitive.attributes["NORMAL"] = buffer.array(floats(vertex_normals(skin.vertices, skin.triangles)),
-                                                TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
+  primitive.attributes["NORMAL"] =
+      buffer.array(floats(vertex_normals(skin.vertices, skin.triangles)), TINYGLTF_TARGET_ARRAY_BUFFER,
+                   TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
   const JointWeights bound = joint_weights(skin.embedding);
   primitive.attributes["JOINTS_0"] =
       buffer.array(bound.joints, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, TINYGLTF_TYPE_VEC4);
   primitive.attributes["WEIGHTS_0"] =
       buffer.array(bound.weights, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC4);
   const std::vector<unsigned> corners(skin.triangles.data(), skin.triangles.data() + skin.triangles.size());
-  primitive.indices =
-      buffer.array(corners, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR);
+  primitive.indices = buffer.array(corners, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
+                                   TINYGLTF_TYPE_SCALAR);
   tinygltf::Mesh mesh;
   mesh.name = options.name;
   mesh.primitives.push_back(primitive);
@@ -160,7 +163,8 @@ void add_mesh(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& 
 }
 
 /// Scene nodes: 0 is the mesh, 1 the still root of the skeleton, 2 + n the joint of control node n.
-void add_skeleton(tinygltf::Model& model, BufferWriter& buffer, const retarget::ControlMesh& body, const GltfOptions& options) {
+void add_skeleton(tinygltf::Model& model, BufferWriter& buffer, const retarget::ControlMesh& body,
+                  const GltfOptions& options) {
   tinygltf::Node mesh_node;
   mesh_node.name = options.name;
   mesh_node.mesh = 0;
@@ -198,7 +202,8 @@ tinygltf::AnimationChannel channel(int sampler, int target, const char* path) {
 }
 
 void add_animation(tinygltf::Model& model, BufferWriter& buffer, const retarget::ControlMesh& body,
-                   const Eigen::Ref<const Eigen::VectorXd>& mass, const retarget::Motion& motion, const GltfOptions& options) {
+                   const Eigen::Ref<const Eigen::VectorXd>& mass, const retarget::Motion& motion,
+                   const GltfOptions& options) {
   const auto frames = static_cast<std::size_t>(motion.count());
   std::vector<float> times(frames);
   for (std::size_t f = 0; f < frames; ++f) times[f] = static_cast<float>(static_cast<double>(f) / motion.rate_hz);
@@ -246,7 +251,8 @@ void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& sk
   assert(skin.embedding.nodes.cols() == skin.vertices.cols());
   constexpr int kMostJoints = std::numeric_limits<unsigned short>::max() + 1;
   if (body.node_count() > kMostJoints) {
-    throw Error(path.string(), "control mesh", std::to_string(body.node_count()) + " nodes are more than glTF can number as joints",
+    throw Error(path.string(), "control mesh",
+                std::to_string(body.node_count()) + " nodes are more than glTF can number as joints",
                 "Ask for at most " + std::to_string(kMostJoints) + " with --nodes");
   }
 
@@ -266,7 +272,7 @@ void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& sk
   std::ostringstream stream;
   tinygltf::TinyGLTF writer;
   writer.WriteGltfSceneToStream(&model, stream, /*prettyPrint=*/false, /*writeBinary=*/true);
-  write_whole_file(path, stream.view());
+  write_file(path, stream.view());
 }
 
 }  // namespace hydrostat::io

@@ -3,13 +3,11 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <numeric>
 #include <string>
 
-#include "io/whole_file.h"
+#include "io/write_file.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -45,7 +43,7 @@ void write(const std::filesystem::path& path, const std::vector<std::size_t>& sh
   bytes += static_cast<char>(header.size() >> 8);
   bytes += header;
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
-  write_whole_file(path, bytes);
+  write_file(path, bytes);
 }
 
 /// The part of the header's dictionary that follows `key`.
@@ -71,19 +69,20 @@ NpyArray<Number> read(const std::filesystem::path& path) {
   const auto refuse = [&](const std::string& what) {
     return Error(path.string(), "header", what, "Give a file that hydrostat's --trace wrote");
   };
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw Error(path.string(), "input", "the file cannot be opened", "Check its name");
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (bytes.size() < kPreamble || bytes.compare(0, kMagic.size(), kMagic) != 0) throw refuse("not a NumPy file of format 1.0");
+  const std::string bytes = read_file(path);
+  if (bytes.size() < kPreamble || bytes.compare(0, kMagic.size(), kMagic) != 0)
+    throw refuse("not a NumPy file of format 1.0");
   const std::size_t header_size = static_cast<unsigned char>(bytes[8]) + 256u * static_cast<unsigned char>(bytes[9]);
   if (bytes.size() < kPreamble + header_size) throw refuse("the file ends inside its header");
   const std::string_view header = std::string_view(bytes).substr(kPreamble, header_size);
-  if (!entry(header, "'descr': '").starts_with(kType<Number>)) throw refuse("the numbers are not of type " + std::string(kType<Number>));
+  if (!entry(header, "'descr': '").starts_with(kType<Number>))
+    throw refuse("the numbers are not of type " + std::string(kType<Number>));
   if (!entry(header, "'fortran_order': ").starts_with("False")) throw refuse("the array is not in C order");
 
   NpyArray<Number> array{read_shape(entry(header, "'shape': (")), {}};
   const std::size_t body = bytes.size() - kPreamble - header_size;
-  if (body != product(array.shape) * sizeof(Number)) throw refuse("the file does not hold as many numbers as its shape says");
+  if (body != product(array.shape) * sizeof(Number))
+    throw refuse("the file does not hold as many numbers as its shape says");
   array.values.resize(body / sizeof(Number));
   if (body > 0) std::memcpy(array.values.data(), bytes.data() + kPreamble + header_size, body);
   return array;

@@ -19,8 +19,8 @@ struct NpyArray {
 void write_npy(const std::filesystem::path& path, const std::vector<std::size_t>& shape, std::span<const double> values);
 void write_npy(const std::filesystem::path& path, const std::vector<std::size_t>& shape, std::span<const int> values);
 
-/// Reads what write_npy wrote (NumPy writes the same for such arrays). Throws Error for a file that is not one, is cut short,
-/// has another type of number, or lies in Fortran order.
+/// Reads what write_npy wrote (NumPy writes the same for such arrays). Throws Error for a file that is not one, is cut
+/// short, has another type of number, or lies in Fortran order.
 NpyArray<double> read_npy_double(const std::filesystem::path& path);
 NpyArray<int> read_npy_int(const std::filesystem::path& path);
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "io/whole_file.h"
+#include "io/write_file.h"
 
 namespace hydrostat::io {
 namespace {
@@ -192,7 +192,7 @@ std::string report_json(const retarget::RunReport& report) {
 }
 
 void write_report(const std::filesystem::path& path, const retarget::RunReport& report) {
-  write_whole_file(path, report_json(report));
+  write_file(path, report_json(report));
 }
 
 }  // namespace hydrostat::io

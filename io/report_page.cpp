@@ -9,7 +9,7 @@
 
 #include "io/report.h"
 #include "io/viewer_bundle.h"
-#include "io/whole_file.h"
+#include "io/write_file.h"
 
 namespace hydrostat::io {
 namespace {
@@ -50,12 +50,18 @@ std::string packed_as(const Eigen::DenseBase<Derived>& values) {
 
 const char* role_name(PageRole role) {
   switch (role) {
-    case PageRole::kClip: return "clip";
-    case PageRole::kTarget: return "target";
-    case PageRole::kReplay: return "replay";
-    case PageRole::kOpenLoop: return "open_loop";
-    case PageRole::kNaive: return "naive";
-    case PageRole::kOther: break;
+    case PageRole::kClip:
+      return "clip";
+    case PageRole::kTarget:
+      return "target";
+    case PageRole::kReplay:
+      return "replay";
+    case PageRole::kOpenLoop:
+      return "open_loop";
+    case PageRole::kNaive:
+      return "naive";
+    case PageRole::kOther:
+      break;
   }
   return "other";
 }
@@ -76,7 +82,8 @@ Json quantised(const retarget::Motion& motion, Eigen::Index stride) {
   for (Eigen::Index f = 0; f < motion.count(); f += stride, corner += 3) {
     const Eigen::Vector3d least = Eigen::Map<const Eigen::Vector3f>(&corners[corner]).cast<double>();
     for (double steps_away : ((motion.at(f).colwise() - least) / step).reshaped()) {
-      steps.push_back(static_cast<std::uint16_t>(std::clamp(std::lround(steps_away), 0L, 65535L)));  // the float corner is rounded
+      steps.push_back(
+          static_cast<std::uint16_t>(std::clamp(std::lround(steps_away), 0L, 65535L)));  // the float corner is rounded
     }
   }
   return {{"frames", corners.size() / 3}, {"step", step}, {"corners", packed(corners)}, {"steps", packed(steps)}};
@@ -115,7 +122,8 @@ Json contact_json(const PageContactRow& row) {
   for (retarget::ContactState state : row.states) {
     states += state == retarget::ContactState::kStick ? 'S' : state == retarget::ContactState::kSlide ? 'L' : '.';
   }
-  return {{"patch", row.patch}, {"role", role_name(row.role)}, {"rate_hz", row.rate_hz}, {"loop", row.loop}, {"states", states}};
+  return {
+      {"patch", row.patch}, {"role", role_name(row.role)}, {"rate_hz", row.rate_hz}, {"loop", row.loop}, {"states", states}};
 }
 
 Json page_json(const PageInput& input) {
@@ -166,7 +174,7 @@ void write_report_page(const std::filesystem::path& path, const PageInput& input
   page += "</script>\n<script>";
   page += viewer_script();
   page += "</script>\n</body>\n</html>\n";
-  write_whole_file(path, page);
+  write_file(path, page);
 }
 
 }  // namespace hydrostat::io

@@ -13,7 +13,8 @@ namespace fs = std::filesystem;
 
 /// Eigen's columns are NumPy's rows, so that the memory can be written as it lies.
 template <typename Derived>
-void write_array(const fs::path& path, const std::vector<std::size_t>& shape, const Eigen::PlainObjectBase<Derived>& values) {
+void write_array(const fs::path& path, const std::vector<std::size_t>& shape,
+                 const Eigen::PlainObjectBase<Derived>& values) {
   write_npy(path, shape, std::span<const typename Derived::Scalar>(values.data(), static_cast<std::size_t>(values.size())));
 }
 
@@ -38,9 +39,11 @@ void write_arrays(const fs::path& folder, const retarget::Trace& trace) {
 
 void refuse_other_things(const fs::path& folder) {
   if (!fs::exists(folder)) return;
-  if (!fs::is_directory(folder)) throw Error(folder.string(), "--trace", "a file of this name stands there", "Name another folder");
+  if (!fs::is_directory(folder))
+    throw Error(folder.string(), "--trace", "a file of this name stands there", "Name another folder");
   if (!fs::is_empty(folder) && !fs::exists(folder / "time.npy")) {
-    throw Error(folder.string(), "--trace", "the folder holds something that is not a trace", "Name an empty or a new folder");
+    throw Error(folder.string(), "--trace", "the folder holds something that is not a trace",
+                "Name an empty or a new folder");
   }
 }
 

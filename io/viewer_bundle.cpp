@@ -4,10 +4,12 @@
 asm(".section .rodata\n"
     ".global hydrostat_viewer_script, hydrostat_viewer_script_end, hydrostat_viewer_style, hydrostat_viewer_style_end\n"
     "hydrostat_viewer_script:\n"
-    ".incbin \"" HYDROSTAT_VIEWER_JS "\"\n"
+    ".incbin \"" HYDROSTAT_VIEWER_JS
+    "\"\n"
     "hydrostat_viewer_script_end:\n"
     "hydrostat_viewer_style:\n"
-    ".incbin \"" HYDROSTAT_VIEWER_CSS "\"\n"
+    ".incbin \"" HYDROSTAT_VIEWER_CSS
+    "\"\n"
     "hydrostat_viewer_style_end:\n"
     ".previous\n");
 

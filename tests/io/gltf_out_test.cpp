@@ -62,7 +62,8 @@ Creature random_creature(unsigned seed, int nodes, int vertices, int frames) {
 Eigen::Matrix3Xd embedded(const Creature& creature, const Eigen::Matrix3Xd& nodes) {
   Eigen::Matrix3Xd positions = Eigen::Matrix3Xd::Zero(3, creature.vertices.cols());
   for (Eigen::Index v = 0; v < positions.cols(); ++v) {
-    for (int k = 0; k < 4; ++k) positions.col(v) += creature.embedding.weights(k, v) * nodes.col(creature.embedding.nodes(k, v));
+    for (int k = 0; k < 4; ++k)
+      positions.col(v) += creature.embedding.weights(k, v) * nodes.col(creature.embedding.nodes(k, v));
   }
   return positions;
 }
@@ -87,11 +88,13 @@ std::vector<Number> values(const tinygltf::Model& model, int index) {
   const tinygltf::BufferView& view = model.bufferViews.at(static_cast<std::size_t>(accessor.bufferView));
   const auto components = static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)));
   std::vector<Number> result(accessor.count * components);
-  std::memcpy(result.data(), model.buffers[0].data.data() + view.byteOffset + accessor.byteOffset, result.size() * sizeof(Number));
+  std::memcpy(result.data(), model.buffers[0].data.data() + view.byteOffset + accessor.byteOffset,
+              result.size() * sizeof(Number));
   return result;
 }
 
-/// Linear blend skinning as an engine does it, from what the file says, between key `key` and the next at `share` of the way.
+/// Linear blend skinning as an engine does it, from what the file says, between key `key` and the next at `share` of the
+/// way.
 Eigen::Matrix3Xd play(const tinygltf::Model& model, std::size_t key, double share = 0) {
   const tinygltf::Primitive& primitive = model.meshes[0].primitives[0];
   const std::vector<float> positions = values<float>(model, primitive.attributes.at("POSITION"));
@@ -101,7 +104,8 @@ Eigen::Matrix3Xd play(const tinygltf::Model& model, std::size_t key, double shar
   std::vector<Eigen::Affine3d> pose(model.skins[0].joints.size());
   const tinygltf::Animation& animation = model.animations.at(0);
   for (const tinygltf::AnimationChannel& channel : animation.channels) {
-    const std::vector<float> keys = values<float>(model, animation.samplers[static_cast<std::size_t>(channel.sampler)].output);
+    const std::vector<float> keys =
+        values<float>(model, animation.samplers[static_cast<std::size_t>(channel.sampler)].output);
     const auto joint = static_cast<std::size_t>(channel.target_node - model.skins[0].joints[0]);
     const std::size_t next = share > 0 ? key + 1 : key;
     if (channel.target_path == "translation") {
@@ -178,8 +182,10 @@ TEST(WriteSkinnedGlb, ALoopEndsWhereItsNextPeriodBegins) {
   write(scratch("loop"), creature);
   const tinygltf::Model model = load(scratch("loop"));
   EXPECT_FLOAT_EQ(values<float>(model, model.animations[0].samplers[0].input).back(), 6.0f / 30.0f);
-  const Eigen::Matrix3Xd next = (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()).toRotationMatrix() *
-                                 embedded(creature, creature.motion.at(0))).colwise() + creature.motion.travel;
+  const Eigen::Matrix3Xd next =
+      (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()).toRotationMatrix() * embedded(creature, creature.motion.at(0)))
+          .colwise() +
+      creature.motion.travel;
   EXPECT_LT((play(model, 6) - next).cwiseAbs().maxCoeff(), 2e-6);
 }
 

@@ -43,7 +43,8 @@ struct WobblingBar {
     embedding.weights = Eigen::Matrix4Xd::Zero(4, kNodes);
     embedding.nodes.row(0) = Eigen::RowVectorXi::LinSpaced(kNodes, 0, kNodes - 1);
     embedding.weights.row(0).setOnes();
-    std::vector<Eigen::Vector3i> triangles{{0, 1, 3}, {0, 3, 2}, {kNodes - 4, kNodes - 1, kNodes - 3}, {kNodes - 4, kNodes - 2, kNodes - 1}};
+    std::vector<Eigen::Vector3i> triangles{
+        {0, 1, 3}, {0, 3, 2}, {kNodes - 4, kNodes - 1, kNodes - 3}, {kNodes - 4, kNodes - 2, kNodes - 1}};
     std::vector<Eigen::Vector2i> edges;
     const int ring[] = {0, 1, 3, 2, 0};
     for (int c = 0; c <= kCells; ++c) {
@@ -64,7 +65,8 @@ struct WobblingBar {
   }
 
   void fill_report() {
-    report.source = {"bar_wobble.glb", "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef", "wobble", "auto", 1.0, 24, 1};
+    report.source = {
+        "bar_wobble.glb", "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef", "wobble", "auto", 1.0, 24, 1};
     report.body.nodes = kNodes;
     report.body.constraints = static_cast<int>(body.edges.cols());
     report.body.mass_kg = 38.4;
@@ -86,7 +88,8 @@ struct WobblingBar {
     replay.fall_cause = "tilt of 61 degrees beyond the target's at 'LeftFoot'";
     replay.shape_rms_length = 0.22;
     report.naive = replay;
-    report.effects = {{"gravity", "on", "always", 0.02}, {"self_contact", "off", "no two far regions come within two cells", 0}};
+    report.effects = {{"gravity", "on", "always", 0.02},
+                      {"self_contact", "off", "no two far regions come within two cells", 0}};
     report.accuracy = {"explicit", "tet", 1e-4, 0.002};
     report.timing_s = {{"import", 0.3}, {"body", 0.8}, {"prepare", 3.1}, {"invert", 12.5}, {"replay", 4.4}};
     report.warnings = {"the clip closes only to 0.4 % L; the rest was spread over the period"};
@@ -117,7 +120,9 @@ struct WobblingBar {
     retarget::Motion loop = motion(static_cast<int>(kRate * kPeriod), kRate, 0);
     loop.loop = true;
     loop.travel = {0.3, 0, 0};
-    input.motions = {{PageRole::kClip, true, loop}, {PageRole::kTarget, false, loop}, {PageRole::kReplay, false, motion(601, 120, 1)},
+    input.motions = {{PageRole::kClip, true, loop},
+                     {PageRole::kTarget, false, loop},
+                     {PageRole::kReplay, false, motion(601, 120, 1)},
                      {PageRole::kNaive, false, motion(301, 120, 5)}};
     const Eigen::VectorXd time = Eigen::VectorXd::LinSpaced(301, 0, 5);
     const Eigen::VectorXd height = 0.15 + 0.05 * (6 * time.array()).sin();
@@ -125,8 +130,15 @@ struct WobblingBar {
     broken.segment(100, 20).setConstant(std::numeric_limits<double>::quiet_NaN());
     const Eigen::VectorXd x = 0.3 * time, z = 0.05 * (2 * time.array()).cos();
     input.charts = {
-        {"COM path", "x [m]", "z [m]", false, {{"target", PageRole::kTarget, x, 0 * z}, {"replay", PageRole::kReplay, 0.95 * x, z}}},
-        {"Height of the COM", "time [s]", "height [m]", true,
+        {"COM path",
+         "x [m]",
+         "z [m]",
+         false,
+         {{"target", PageRole::kTarget, x, 0 * z}, {"replay", PageRole::kReplay, 0.95 * x, z}}},
+        {"Height of the COM",
+         "time [s]",
+         "height [m]",
+         true,
          {{"target", PageRole::kTarget, time, height}, {"replay", PageRole::kReplay, time.array() + 0.001, broken}}},
         {"Activations", "time [s]", "[-]", true, {}}};
     for (int muscle = 0; muscle < 9; ++muscle) {

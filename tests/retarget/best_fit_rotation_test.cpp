@@ -50,7 +50,7 @@ TEST(BestFitRotation, NoNearbyTurnFitsBetter) {
     EXPECT_NEAR(best.determinant(), 1, 1e-12);
     for (int axis = 0; axis < 3; ++axis) {
       for (double angle : {-0.01, 0.01}) {
-        const Eigen::Matrix3d other = Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(axis)) * best;
+        const Eigen::Matrix3d other = Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(axis)).toRotationMatrix() * best;
         EXPECT_GT(misfit(cloud, moved, other), misfit(cloud, moved, best));
       }
     }
@@ -70,7 +70,8 @@ TEST(BestFitRotations, StayOnOneHemisphereOverManyTurns) {
   Motion motion;
   motion.frames.resize(cloud.points.size(), 60);
   for (Eigen::Index f = 0; f < 60; ++f) {
-    motion.at(f) = Eigen::AngleAxisd(0.5 * static_cast<double>(f), Eigen::Vector3d::UnitY()) * cloud.points;
+    const Eigen::AngleAxisd turn(0.5 * static_cast<double>(f), Eigen::Vector3d::UnitY());
+    motion.at(f) = turn.toRotationMatrix() * cloud.points;
   }
   const std::vector<Eigen::Quaterniond> turns = best_fit_rotations(cloud.points, motion, cloud.mass);
   for (std::size_t f = 1; f < turns.size(); ++f) {

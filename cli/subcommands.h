@@ -17,6 +17,5 @@ void add_signals(CLI::App& app, int& exit_code);
 void add_batch(CLI::App& app, int& exit_code);
 
 /// `hydrostat signals DIR list|plot|set|gain|shift|filter|layers|reset`: activations, and the layers that edit them.
-void add_signals(CLI::App& app, int& exit_code);
 
 }  // namespace hydrostat::cli

@@ -29,7 +29,7 @@ const std::string kSamples = HYDROSTAT_SAMPLES;
 /// Where clips lie that others made and that are not part of this project; empty when they are not there.
 std::string assets() {
   const char* set = std::getenv("HYDROSTAT_ASSETS");
-  const std::string directory = set ? set : HYDROSTAT_ASSETS_DEFAULT;
+  const std::string directory = set ? set : HYDROSTAT_DEFAULT_ASSETS;
   return std::filesystem::exists(directory + "/golden_bbox.json") ? directory : std::string();
 }
 

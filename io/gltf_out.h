@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+
+#include "retarget/control_mesh.h"
+#include "retarget/motion.h"
+
+namespace hydrostat::io {
+
+struct GltfOptions {
+  std::string name = "creature";                        // of the scene's nodes and of the animation
+  std::array<double, 4> colour{0.80, 0.45, 0.30, 1.0};  // of the skin: linear red, green, blue, alpha in 0..1
+};
+
+/// A surface that a control mesh carries, as it lies in the bind pose.
+struct EmbeddedSkin {
+  const Eigen::Matrix3Xd& vertices;      // [m] 3 x V
+  const Eigen::Matrix3Xi& triangles;     // 3 x T
+  const retarget::Embedding& embedding;  // of the V vertices in the control mesh
+};
+
+/// Writes a binary glTF 2.0 file in which the fine skin moves with the control nodes: one joint per node, keyed with the
+/// node's position, and one rotation R common to all joints, the best fit of the control mesh to its rest shape (weighted by
+/// the node masses, N, [kg]). With the inverse bind matrices translate(-X) linear blend skinning gives
+///   v = R (v_bind - sum w X) + sum w x,
+/// the embedded position exactly, between keys too, where v_bind is the same weighted sum of rest nodes; what the embedding
+/// misses it by turns with R, as the normals do.
+/// A loop gets its first frame, moved on by one period, as last key. Numbers are float32. Throws Error when the file cannot
+/// be written, or for a body of more than 65536 nodes (glTF's joint indices).
+void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& skin, const retarget::ControlMesh& body,
+                       const Eigen::Ref<const Eigen::VectorXd>& mass, const retarget::Motion& motion,
+                       const GltfOptions& options);
+
+}  // namespace hydrostat::io

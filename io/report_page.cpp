@@ -1,0 +1,180 @@
+#include "io/report_page.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "io/report.h"
+#include "io/viewer_bundle.h"
+#include "io/write_file.h"
+
+namespace hydrostat::io {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kNodeRate = 60;  // [Hz]
+constexpr double kSkinRate = 30;  // [Hz]: vertices are many, and the view interpolates
+
+/// Source: RFC 4648, section 4.
+std::string base64(std::span<const unsigned char> bytes) {
+  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t present = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < present ? bytes[i + k] : 0u);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= present ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+template <typename Number>
+std::string packed(const std::vector<Number>& values) {
+  return base64({reinterpret_cast<const unsigned char*>(values.data()), values.size() * sizeof(Number)});
+}
+
+template <typename Number, typename Derived>
+std::string packed_as(const Eigen::DenseBase<Derived>& values) {
+  std::vector<Number> numbers;
+  numbers.reserve(static_cast<std::size_t>(values.size()));
+  for (Eigen::Index c = 0; c < values.cols(); ++c) {
+    for (Eigen::Index r = 0; r < values.rows(); ++r) numbers.push_back(static_cast<Number>(values(r, c)));
+  }
+  return packed(numbers);
+}
+
+const char* role_name(PageRole role) {
+  switch (role) {
+    case PageRole::kClip:
+      return "clip";
+    case PageRole::kTarget:
+      return "target";
+    case PageRole::kReplay:
+      return "replay";
+    case PageRole::kOpenLoop:
+      return "open_loop";
+    case PageRole::kNaive:
+      return "naive";
+    case PageRole::kOther:
+      break;
+  }
+  return "other";
+}
+
+/// Every frame's positions as 16-bit steps from that frame's own least corner, so that travel costs no precision. All frames
+/// share the step [m].
+Json quantised(const retarget::Motion& motion, Eigen::Index stride) {
+  std::vector<float> corners;
+  double extent = 0;
+  for (Eigen::Index f = 0; f < motion.count(); f += stride) {
+    const Eigen::Vector3d least = motion.at(f).rowwise().minCoeff(), most = motion.at(f).rowwise().maxCoeff();
+    for (double part : least) corners.push_back(static_cast<float>(part));
+    extent = std::max(extent, (most - least).maxCoeff());
+  }
+  const double step = extent > 0 ? extent / 65535 : 1;
+  std::vector<std::uint16_t> steps;
+  std::size_t corner = 0;
+  for (Eigen::Index f = 0; f < motion.count(); f += stride, corner += 3) {
+    const Eigen::Vector3d least = Eigen::Map<const Eigen::Vector3f>(&corners[corner]).cast<double>();
+    for (double steps_away : ((motion.at(f).colwise() - least) / step).reshaped()) {
+      steps.push_back(
+          static_cast<std::uint16_t>(std::clamp(std::lround(steps_away), 0L, 65535L)));  // the float corner is rounded
+    }
+  }
+  return {{"frames", corners.size() / 3}, {"step", step}, {"corners", packed(corners)}, {"steps", packed(steps)}};
+}
+
+Json motion_json(const PageMotion& shown) {
+  const retarget::Motion& motion = shown.motion;
+  const double most = shown.of_skin ? kSkinRate : kNodeRate;
+  const auto stride = std::max<Eigen::Index>(1, static_cast<Eigen::Index>(std::ceil(motion.rate_hz / most - 1e-6)));
+  Json json = quantised(motion, stride);
+  json["role"] = role_name(shown.role);
+  json["of_skin"] = shown.of_skin;
+  json["rate_hz"] = motion.rate_hz / static_cast<double>(stride);
+  json["loop"] = motion.loop;
+  json["duration_s"] = motion.duration_s();
+  json["travel"] = {motion.travel.x(), motion.travel.y(), motion.travel.z()};
+  json["yaw"] = motion.yaw;
+  return json;
+}
+
+Json chart_json(const PageChart& chart) {
+  Json json{{"title", chart.title}, {"x_label", chart.x_label}, {"y_label", chart.y_label}, {"over_time", chart.over_time}};
+  json["curves"] = Json::array();
+  for (const PageCurve& curve : chart.curves) {
+    assert(curve.x.size() == curve.y.size());
+    json["curves"].push_back({{"name", curve.name},
+                              {"role", role_name(curve.role)},
+                              {"x", packed_as<double>(curve.x)},
+                              {"y", packed_as<float>(curve.y)}});
+  }
+  return json;
+}
+
+Json contact_json(const PageContactRow& row) {
+  std::string states;
+  for (retarget::ContactState state : row.states) {
+    states += state == retarget::ContactState::kStick ? 'S' : state == retarget::ContactState::kSlide ? 'L' : '.';
+  }
+  return {
+      {"patch", row.patch}, {"role", role_name(row.role)}, {"rate_hz", row.rate_hz}, {"loop", row.loop}, {"states", states}};
+}
+
+Json page_json(const PageInput& input) {
+  Json json;
+  json["report"] = Json::parse(report_json(input.report));
+  json["ground_height"] = input.ground_height;
+  json["skin"] = {{"triangles", packed_as<std::uint32_t>(input.skin.triangles)},
+                  {"nodes", packed_as<std::uint32_t>(input.embedding.nodes)},
+                  {"weights", packed_as<float>(input.embedding.weights)}};
+  json["body"] = {{"nodes", packed_as<float>(input.body.nodes)}, {"edges", packed_as<std::uint32_t>(input.body.edges)}};
+  json["motions"] = Json::array();
+  for (const PageMotion& motion : input.motions) {
+    assert(motion.motion.count() > 0);
+    assert(motion.motion.frames.rows() == 3 * (motion.of_skin ? input.skin.vertices : input.body.nodes).cols());
+    json["motions"].push_back(motion_json(motion));
+  }
+  json["charts"] = Json::array();
+  for (const PageChart& chart : input.charts) json["charts"].push_back(chart_json(chart));
+  json["contacts"] = Json::array();
+  for (const PageContactRow& row : input.contacts) json["contacts"].push_back(contact_json(row));
+  return json;
+}
+
+/// Text that may stand inside a script element: no '<', so that no name from a clip can end it.
+std::string without_tags(const std::string& json) {
+  std::string text;
+  text.reserve(json.size());
+  for (char c : json) {
+    if (c == '<') {
+      text += "\\u003c";
+    } else {
+      text += c;
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+void write_report_page(const std::filesystem::path& path, const PageInput& input) {
+  std::string page =
+      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<link rel=\"icon\" href=\"data:,\">\n<title>hydrostat</title>\n<style>";
+  page += viewer_style();
+  page += "</style>\n</head>\n<body>\n<script type=\"application/json\" id=\"data\">";
+  page += without_tags(page_json(input).dump(-1, ' ', false, Json::error_handler_t::replace));
+  page += "</script>\n<script>";
+  page += viewer_script();
+  page += "</script>\n</body>\n</html>\n";
+  write_file(path, page);
+}
+
+}  // namespace hydrostat::io

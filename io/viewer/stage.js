@@ -1,0 +1,273 @@
+// The view: skins of the motions over a ground with a grid in metres.
+import {
+  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, HemisphereLight,
+  LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshStandardMaterial, PCFSoftShadowMap, PerspectiveCamera,
+  PlaneGeometry, Scene, Vector3, WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+
+import { centre, floats, indices, kRoles } from './data.js';
+
+/** The skin that control nodes carry: vertex v is the weighted sum of its four nodes. */
+function embed(nodes, skin, out) {
+  for (let v = 0; v < out.length / 3; ++v) {
+    let [x, y, z] = [0, 0, 0];
+    for (let k = 4 * v; k < 4 * v + 4; ++k) {
+      const n = 3 * skin.nodes[k];
+      const weight = skin.weights[k];
+      x += weight * nodes[n];
+      y += weight * nodes[n + 1];
+      z += weight * nodes[n + 2];
+    }
+    out[3 * v] = x;
+    out[3 * v + 1] = y;
+    out[3 * v + 2] = z;
+  }
+}
+
+/** Extents of points along the horizontal direction `along` (x, z). */
+function width_along(positions, along) {
+  let [least, most] = [Infinity, -Infinity];
+  for (let i = 0; i < positions.length; i += 3) {
+    const place = positions[i] * along[0] + positions[i + 2] * along[1];
+    least = Math.min(least, place);
+    most = Math.max(most, place);
+  }
+  return most - least;
+}
+
+/** Horizontal direction (x, z) in which the motion goes; where it stays, the body's longer axis. */
+function heading_of(motion, length) {
+  const start = centre(motion.at(0));
+  const end = centre(motion.at(motion.duration_s));
+  const way = [end[0] - start[0], end[2] - start[2]];
+  const size = Math.hypot(...way);
+  if (size > 0.2 * length) return [way[0] / size, way[1] / size];
+  const positions = motion.at(0);
+  return width_along(positions, [1, 0]) >= width_along(positions, [0, 1]) ? [1, 0] : [0, 1];
+}
+
+/** A floor with lines every `step` metres and finer ones every tenth, drawn in its shader: lines of geometry would fight its depth. */
+function grid_material(step, lines) {
+  const material = new MeshLambertMaterial();
+  material.onBeforeCompile = (shader) => {
+    Object.assign(shader.uniforms, { grid_step: { value: step }, grid_colour: { value: lines } });
+    shader.vertexShader = shader.vertexShader
+      .replace('#include <common>', '#include <common>\nvarying vec3 world_place;')
+      .replace('#include <begin_vertex>', '#include <begin_vertex>\nworld_place = (modelMatrix * vec4(position, 1.0)).xyz;');
+    shader.fragmentShader = shader.fragmentShader
+      .replace('#include <common>', `#include <common>
+        varying vec3 world_place;
+        uniform float grid_step;
+        uniform vec3 grid_colour;
+        float line_share(float spacing, float pixels) {
+          vec2 place = world_place.xz / spacing;
+          vec2 width = fwidth(place);
+          vec2 away = abs(fract(place - 0.5) - 0.5) / width;
+          vec2 share = clamp(pixels - away, 0.0, 1.0) * clamp(1.0 - 2.5 * width, 0.0, 1.0);
+          return max(share.x, share.y);
+        }`)
+      .replace('#include <color_fragment>', `#include <color_fragment>
+        float share = max(0.55 * line_share(grid_step, 1.2), 0.25 * line_share(0.1 * grid_step, 1.0));
+        diffuseColor.rgb = mix(diffuseColor.rgb, grid_colour, share);`);
+  };
+  return material;
+}
+
+export class Stage {
+  constructor(canvas, page) {
+    this.canvas = canvas;
+    this.skin = { nodes: indices(page.skin.nodes), weights: floats(page.skin.weights) };
+    this.triangles = indices(page.skin.triangles);
+    this.edges = indices(page.body.edges);
+    this.rest = floats(page.body.nodes);
+    this.length = page.report.body.length_m || 1;
+    this.view = 'overlay';
+    this.follows = true;
+    this.shows_mesh = false;
+    this.ground_height = page.ground_height;
+
+    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFSoftShadowMap;
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(35, 1, 0.05 * this.length, 60 * this.length);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.maxPolarAngle = 0.495 * Math.PI;
+    this.controls.addEventListener('change', () => this.draw());
+
+    this.add_lights();
+    this.add_ground();
+    this.bodies = page.motions.filter((motion) => kRoles[motion.role]).map((motion) => this.add_body(motion));
+    this.leader = (this.bodies.find((body) => body.motion.role === 'replay') ?? this.bodies[0])?.motion;
+    this.add_control_mesh();
+    if (this.leader) this.place_camera();
+  }
+
+  add_lights() {
+    this.scene.add(new HemisphereLight(0xffffff, 0x8c8275, 1.4), new AmbientLight(0xffffff, 0.35));
+    this.sun = new DirectionalLight(0xffffff, 2.2);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(2048, 2048);
+    this.sun.shadow.radius = 3;
+    const reach = 2.2 * this.length;
+    Object.assign(this.sun.shadow.camera, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.1, far: 12 * this.length });
+    this.sun.shadow.normalBias = 0.004 * this.length;
+    this.scene.add(this.sun, this.sun.target);
+  }
+
+  add_ground() {
+    this.grid_step = 10 ** Math.round(Math.log10(this.length));
+    this.line_colour = new Color();
+    const extent = 120 * this.length;
+    this.floor = new Mesh(new PlaneGeometry(extent, extent), grid_material(this.grid_step, this.line_colour));
+    this.floor.rotation.x = -Math.PI / 2;
+    this.floor.receiveShadow = true;
+    this.scene.add(this.floor);
+  }
+
+  add_body(motion) {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(new Float32Array((this.skin.nodes.length / 4) * 3), 3));
+    geometry.setIndex(new BufferAttribute(this.triangles, 1));
+    const material = new MeshStandardMaterial({ color: kRoles[motion.role].colour, roughness: 0.75, side: DoubleSide });
+    const mesh = new Mesh(geometry, material);
+    mesh.frustumCulled = false;
+    this.scene.add(mesh);
+    return { motion, mesh, visible: ['clip', 'target', 'replay'].includes(motion.role) };
+  }
+
+  /** The replay's springs, coloured by their stretch. */
+  add_control_mesh() {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(new Float32Array(this.edges.length * 3), 3));
+    geometry.setAttribute('color', new BufferAttribute(new Float32Array(this.edges.length * 3), 3));
+    this.springs = new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true }));
+    this.springs.frustumCulled = false;
+    this.scene.add(this.springs);
+  }
+
+  place_camera() {
+    const [hx, hz] = heading_of(this.leader, this.length);
+    this.aside = [-hz, hx];
+    const positions = this.bodies.map((body) => body.motion).find((motion) => motion.of_skin)?.at(0) ?? this.leader.at(0);
+    this.spacing = width_along(positions, this.aside) + 0.35 * this.length;
+    const start = centre(this.leader.at(0));
+    this.focus = new Vector3(start[0], 0.5 * (start[1] + this.ground_height), start[2]);
+    this.controls.target.copy(this.focus);
+    this.camera_way = new Vector3(0.45 * hx - hz, 0.42, 0.45 * hz + hx).normalize();
+    this.set_distance();
+  }
+
+  set_distance() {
+    // A narrow view needs more distance to hold the body's length.
+    const room = Math.max(1, 1.25 / this.camera.aspect);
+    const distance = this.length * (this.view === 'side' ? 3.4 : 2.3) * room;
+    this.camera.position.copy(this.controls.target).addScaledVector(this.camera_way, distance);
+    this.controls.update();
+  }
+
+  set_view(view) {
+    this.view = view;
+    if (this.leader) this.set_distance();
+  }
+
+  set_theme(colours) {
+    const background = new Color(colours.background);
+    this.scene.background = background;
+    this.scene.fog = new Fog(background, 6 * this.length, 22 * this.length);
+    this.floor.material.color.set(colours.floor);
+    this.line_colour.set(colours.grid);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+  }
+
+  show(t) {
+    const shown = this.bodies.filter((body) => body.visible);
+    const side = this.view === 'side';
+    for (const body of this.bodies) {
+      body.mesh.visible = body.visible;
+      if (!body.visible) continue;
+      const rank = side ? shown.indexOf(body) - (shown.length - 1) / 2 : 0;
+      body.mesh.position.set(rank * this.spacing * this.aside[0], 0, rank * this.spacing * this.aside[1]);
+      this.dress(body, side);
+      this.move_skin(body, t);
+    }
+    this.move_springs(t);
+    this.follow(t);
+    this.draw();
+  }
+
+  /** The replay is solid; in the overlay what it is compared with is glass. */
+  dress(body, side) {
+    const is_replay = body.motion.role === 'replay';
+    const opacity = is_replay ? (this.shows_mesh ? 0.3 : 1) : side ? 1 : 0.3;
+    body.mesh.material.transparent = opacity < 1;
+    body.mesh.material.opacity = opacity;
+    body.mesh.material.depthWrite = opacity === 1;
+    body.mesh.castShadow = side || is_replay;
+    body.mesh.renderOrder = opacity < 1 ? 1 : 0;
+  }
+
+  move_skin(body, t) {
+    const attribute = body.mesh.geometry.getAttribute('position');
+    const positions = body.motion.at(t);
+    if (body.motion.of_skin) attribute.array.set(positions);
+    else embed(positions, this.skin, attribute.array);
+    attribute.needsUpdate = true;
+    body.mesh.geometry.computeVertexNormals();
+  }
+
+  move_springs(t) {
+    const body = this.bodies.find((other) => other.motion === this.leader);
+    this.springs.visible = this.shows_mesh && !!body && body.visible && !this.leader.of_skin;
+    if (!this.springs.visible) return;
+    const nodes = this.leader.at(t);
+    const place = this.springs.geometry.getAttribute('position');
+    const colour = this.springs.geometry.getAttribute('color');
+    const distance = (positions, a, b) =>
+      Math.hypot(positions[3 * a] - positions[3 * b], positions[3 * a + 1] - positions[3 * b + 1], positions[3 * a + 2] - positions[3 * b + 2]);
+    const tint = new Color();
+    for (let e = 0; e < this.edges.length; e += 2) {
+      const [a, b] = [this.edges[e], this.edges[e + 1]];
+      const strain = distance(nodes, a, b) / distance(this.rest, a, b) - 1;
+      const strength = Math.min(1, Math.abs(strain) / 0.15);
+      tint.setHSL(strain < 0 ? 0.6 : 0.02, strength, 0.5);
+      [a, b].forEach((n, end) => {
+        place.setXYZ(e + end, nodes[3 * n], nodes[3 * n + 1], nodes[3 * n + 2]);
+        colour.setXYZ(e + end, tint.r, tint.g, tint.b);
+      });
+    }
+    this.springs.position.copy(body.mesh.position);
+    place.needsUpdate = true;
+    colour.needsUpdate = true;
+  }
+
+  /** Camera, light and floor go with the replay; the floor's grid stays in the world. */
+  follow(t) {
+    if (!this.leader) return;
+    const [x, , z] = centre(this.leader.at(t));
+    const move = new Vector3(x - this.focus.x, 0, z - this.focus.z);
+    this.focus.add(move);
+    if (this.follows) {
+      this.controls.target.add(move);
+      this.camera.position.add(move);
+      this.camera.lookAt(this.controls.target);
+    }
+    const seen = this.controls.target;
+    this.floor.position.set(seen.x, this.ground_height, seen.z);
+    this.sun.target.position.copy(seen);
+    this.sun.position.copy(seen).add(new Vector3(1.2, 4, 1.6).multiplyScalar(this.length));
+  }
+
+  draw() {
+    this.renderer.render(this.scene, this.camera);
+  }
+}

@@ -1,0 +1,224 @@
+#include "io/gltf_out.h"
+
+#include <gtest/gtest.h>
+#include <tiny_gltf.h>
+
+#include <Eigen/Geometry>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include "retarget/error.h"
+
+namespace hydrostat::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A body of random tets over a cloud of nodes, points inside of them, and nodes that turn, travel and wobble.
+struct Creature {
+  retarget::ControlMesh body;
+  Eigen::VectorXd mass;
+  Eigen::Matrix3Xd vertices;
+  Eigen::Matrix3Xi triangles;
+  retarget::Embedding embedding;
+  retarget::Motion motion;
+};
+
+Creature random_creature(unsigned seed, int nodes, int vertices, int frames) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<> uniform(0, 1);
+  Creature creature;
+  creature.body.nodes = Eigen::Matrix3Xd::NullaryExpr(3, nodes, [&] { return uniform(random); });
+  creature.mass = Eigen::VectorXd::NullaryExpr(nodes, [&] { return 0.1 + uniform(random); });
+  creature.vertices.resize(3, vertices);
+  creature.embedding.nodes.resize(4, vertices);
+  creature.embedding.weights.resize(4, vertices);
+  for (int v = 0; v < vertices; ++v) {
+    const int first = static_cast<int>(random() % static_cast<unsigned>(nodes));
+    for (int k = 0; k < 4; ++k) {
+      creature.embedding.nodes(k, v) = (first + k) % nodes;
+      creature.embedding.weights(k, v) = v % 5 == 0 && k > 0 ? 0 : uniform(random);  // some vertices lie on a node
+    }
+    creature.embedding.weights.col(v) /= creature.embedding.weights.col(v).sum();
+    creature.vertices.col(v).setZero();
+    for (int k = 0; k < 4; ++k) {
+      creature.vertices.col(v) += creature.embedding.weights(k, v) * creature.body.nodes.col(creature.embedding.nodes(k, v));
+    }
+  }
+  creature.triangles.resize(3, vertices - 2);
+  for (int t = 0; t < vertices - 2; ++t) creature.triangles.col(t) << t, t + 1, t + 2;
+  creature.motion.rate_hz = 30;
+  creature.motion.frames.resize(3 * nodes, frames);
+  for (int f = 0; f < frames; ++f) {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7 * f, Eigen::Vector3d(0.2, 1, 0.1).normalized()).toRotationMatrix();
+    const Eigen::Matrix3Xd wobble = Eigen::Matrix3Xd::NullaryExpr(3, nodes, [&] { return 0.05 * uniform(random); });
+    creature.motion.at(f) = (turn * (creature.body.nodes + wobble)).colwise() + Eigen::Vector3d(0.1 * f, 0, 0);
+  }
+  return creature;
+}
+
+Eigen::Matrix3Xd embedded(const Creature& creature, const Eigen::Matrix3Xd& nodes) {
+  Eigen::Matrix3Xd positions = Eigen::Matrix3Xd::Zero(3, creature.vertices.cols());
+  for (Eigen::Index v = 0; v < positions.cols(); ++v) {
+    for (int k = 0; k < 4; ++k)
+      positions.col(v) += creature.embedding.weights(k, v) * nodes.col(creature.embedding.nodes(k, v));
+  }
+  return positions;
+}
+
+void write(const fs::path& path, const Creature& creature) {
+  write_skinned_glb(path, {creature.vertices, creature.triangles, creature.embedding}, creature.body, creature.mass,
+                    creature.motion, {});
+}
+
+tinygltf::Model load(const fs::path& path) {
+  tinygltf::Model model;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path.string())) << error;
+  EXPECT_EQ(warning, "");
+  return model;
+}
+
+template <typename Number>
+std::vector<Number> values(const tinygltf::Model& model, int index) {
+  const tinygltf::Accessor& accessor = model.accessors.at(static_cast<std::size_t>(index));
+  const tinygltf::BufferView& view = model.bufferViews.at(static_cast<std::size_t>(accessor.bufferView));
+  const auto components = static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)));
+  std::vector<Number> result(accessor.count * components);
+  std::memcpy(result.data(), model.buffers[0].data.data() + view.byteOffset + accessor.byteOffset,
+              result.size() * sizeof(Number));
+  return result;
+}
+
+/// Linear blend skinning as an engine does it, from what the file says, between key `key` and the next at `share` of the
+/// way.
+Eigen::Matrix3Xd play(const tinygltf::Model& model, std::size_t key, double share = 0) {
+  const tinygltf::Primitive& primitive = model.meshes[0].primitives[0];
+  const std::vector<float> positions = values<float>(model, primitive.attributes.at("POSITION"));
+  const std::vector<unsigned short> joints = values<unsigned short>(model, primitive.attributes.at("JOINTS_0"));
+  const std::vector<float> weights = values<float>(model, primitive.attributes.at("WEIGHTS_0"));
+  const std::vector<float> inverse_binds = values<float>(model, model.skins[0].inverseBindMatrices);
+  std::vector<Eigen::Affine3d> pose(model.skins[0].joints.size());
+  const tinygltf::Animation& animation = model.animations.at(0);
+  for (const tinygltf::AnimationChannel& channel : animation.channels) {
+    const std::vector<float> keys =
+        values<float>(model, animation.samplers[static_cast<std::size_t>(channel.sampler)].output);
+    const auto joint = static_cast<std::size_t>(channel.target_node - model.skins[0].joints[0]);
+    const std::size_t next = share > 0 ? key + 1 : key;
+    if (channel.target_path == "translation") {
+      const Eigen::Vector3d here = Eigen::Map<const Eigen::Vector3f>(&keys[3 * key]).cast<double>();
+      const Eigen::Vector3d there = Eigen::Map<const Eigen::Vector3f>(&keys[3 * next]).cast<double>();
+      pose[joint].translation() = here + share * (there - here);
+    } else {
+      const Eigen::Quaterniond here = Eigen::Map<const Eigen::Quaternionf>(&keys[4 * key]).cast<double>();
+      const Eigen::Quaterniond there = Eigen::Map<const Eigen::Quaternionf>(&keys[4 * next]).cast<double>();
+      pose[joint].linear() = here.slerp(share, there).toRotationMatrix();
+    }
+  }
+  Eigen::Matrix3Xd played = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(positions.size() / 3));
+  for (std::size_t v = 0; v < positions.size() / 3; ++v) {
+    const Eigen::Vector3d bind = Eigen::Map<const Eigen::Vector3f>(&positions[3 * v]).cast<double>();
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::size_t joint = joints[4 * v + k];
+      const Eigen::Matrix4d inverse_bind = Eigen::Map<const Eigen::Matrix4f>(&inverse_binds[16 * joint]).cast<double>();
+      played.col(static_cast<Eigen::Index>(v)) +=
+          double{weights[4 * v + k]} * (pose[joint] * (inverse_bind * bind.homogeneous()).head<3>());
+    }
+  }
+  return played;
+}
+
+fs::path scratch(const std::string& name) { return fs::path(testing::TempDir()) / ("hydrostat_" + name + ".glb"); }
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(WriteSkinnedGlb, AnEnginePlaysTheEmbeddedPositions) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Creature creature = random_creature(seed, /*nodes=*/20, /*vertices=*/60, /*frames=*/8);
+    write(scratch("exact"), creature);
+    const tinygltf::Model model = load(scratch("exact"));
+    for (Eigen::Index f = 0; f < creature.motion.count(); ++f) {
+      const Eigen::Matrix3Xd expected = embedded(creature, creature.motion.at(f));
+      EXPECT_LT((play(model, static_cast<std::size_t>(f)) - expected).cwiseAbs().maxCoeff(), 2e-6);  // [m]: float32
+    }
+    const Eigen::Matrix3Xd halfway = 0.5 * (creature.motion.at(2) + creature.motion.at(3));
+    EXPECT_LT((play(model, 2, 0.5) - embedded(creature, halfway)).cwiseAbs().maxCoeff(), 2e-6);
+  }
+}
+
+TEST(WriteSkinnedGlb, AllJointsTurnAsTheBodyDoesAndTheirKeysTakeTheShortWay) {
+  const Creature creature = random_creature(3, 20, 30, 12);  // 0.7 rad a frame: past half a turn and past a whole one
+  write(scratch("turn"), creature);
+  const tinygltf::Model model = load(scratch("turn"));
+  for (const tinygltf::AnimationChannel& channel : model.animations[0].channels) {
+    if (channel.target_path != "rotation") continue;
+    const std::vector<float> keys =
+        values<float>(model, model.animations[0].samplers[static_cast<std::size_t>(channel.sampler)].output);
+    for (std::size_t f = 0; f < 12; ++f) {
+      const Eigen::Quaterniond turn = Eigen::Map<const Eigen::Quaternionf>(&keys[4 * f]).cast<double>();
+      const Eigen::Quaterniond body(
+          Eigen::AngleAxisd(0.7 * static_cast<double>(f), Eigen::Vector3d(0.2, 1, 0.1).normalized()));
+      EXPECT_NEAR(turn.norm(), 1, 1e-6);
+      EXPECT_LT(turn.angularDistance(body), 0.1);  // [rad]: the wobble turns it too
+      if (f > 0) {
+        EXPECT_GT(turn.dot(Eigen::Map<const Eigen::Quaternionf>(&keys[4 * (f - 1)]).cast<double>()), 0);
+      }
+    }
+  }
+}
+
+TEST(WriteSkinnedGlb, ALoopEndsWhereItsNextPeriodBegins) {
+  Creature creature = random_creature(1, 12, 20, 6);
+  creature.motion.loop = true;
+  creature.motion.travel = {0.4, 0, -0.2};
+  creature.motion.yaw = 0.3;
+  write(scratch("loop"), creature);
+  const tinygltf::Model model = load(scratch("loop"));
+  EXPECT_FLOAT_EQ(values<float>(model, model.animations[0].samplers[0].input).back(), 6.0f / 30.0f);
+  const Eigen::Matrix3Xd next =
+      (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()).toRotationMatrix() * embedded(creature, creature.motion.at(0)))
+          .colwise() +
+      creature.motion.travel;
+  EXPECT_LT((play(model, 6) - next).cwiseAbs().maxCoeff(), 2e-6);
+}
+
+TEST(WriteSkinnedGlb, WeightsSumToOneInFloat) {
+  const Creature creature = random_creature(9, 40, 500, 2);
+  write(scratch("weights"), creature);
+  const tinygltf::Model model = load(scratch("weights"));
+  const std::vector<float> weights = values<float>(model, model.meshes[0].primitives[0].attributes.at("WEIGHTS_0"));
+  for (std::size_t v = 0; v < weights.size(); v += 4) {
+    EXPECT_NEAR(double{weights[v]} + weights[v + 1] + weights[v + 2] + weights[v + 3], 1, 1.2e-7);
+  }
+}
+
+TEST(WriteSkinnedGlb, SameInputGivesSameBytesAndLeavesNothingBeside) {
+  const Creature creature = random_creature(4, 20, 60, 8);
+  write(scratch("first"), creature);
+  write(scratch("second"), creature);
+  EXPECT_EQ(bytes_of(scratch("first")), bytes_of(scratch("second")));
+  EXPECT_FALSE(fs::exists(scratch("first").string() + ".part"));
+}
+
+TEST(WriteSkinnedGlb, KhronosValidatorFindsNothing) {
+  Creature creature = random_creature(2, 20, 60, 8);
+  creature.motion.loop = true;
+  write(scratch("valid"), creature);
+  const std::string command = "NODE_PATH='" HYDROSTAT_NODE_MODULES "' node '" HYDROSTAT_TESTS "/io/validate_glb.cjs' '" +
+                              scratch("valid").string() + "'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
+TEST(WriteSkinnedGlb, RefusesAPlaceThatCannotBeWritten) {
+  EXPECT_THROW(write("/proc/absent/replay.glb", random_creature(0, 5, 6, 2)), Error);
+}
+
+}  // namespace
+}  // namespace hydrostat::io

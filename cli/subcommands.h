@@ -16,6 +16,4 @@ void add_replay(CLI::App& app, int& exit_code);
 void add_signals(CLI::App& app, int& exit_code);
 void add_batch(CLI::App& app, int& exit_code);
 
-/// `hydrostat signals DIR list|plot|set|gain|shift|filter|layers|reset`: activations, and the layers that edit them.
-
 }  // namespace hydrostat::cli

@@ -22,8 +22,8 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr int kNone = -1;
-constexpr double kCrumb = 0.06;       // share of a cell below which a part is no part of its own
-constexpr double kLeastFill = 0.05;   // of a kept cell: a sheet still has mass
+constexpr double kCrumb = 0.06;      // share of a cell below which a part is no part of its own
+constexpr double kLeastFill = 0.05;  // of a kept cell: a sheet still has mass
 
 template <typename Vector>
 auto& at(Vector& values, int i) {
@@ -51,7 +51,9 @@ struct Box {
   Eigen::Vector3i size;
 
   int count() const { return size.prod(); }
-  bool holds(const Eigen::Vector3i& place) const { return (place.array() >= 0).all() && (place.array() < size.array()).all(); }
+  bool holds(const Eigen::Vector3i& place) const {
+    return (place.array() >= 0).all() && (place.array() < size.array()).all();
+  }
   int index(const Eigen::Vector3i& place) const { return place[0] + size[0] * (place[1] + size[1] * place[2]); }
   Eigen::Vector3i place(int index) const { return {index % size[0], index / size[0] % size[1], index / size[0] / size[1]}; }
 };
@@ -64,8 +66,8 @@ struct SkinSample {
 
 /// The part of the body that one cell holds in one piece.
 struct Part {
-  int cell;             // index in the box of cells
-  double fill;          // share of the cell
+  int cell;     // index in the box of cells
+  double fill;  // share of the cell
   bool kept = true;
 };
 
@@ -80,10 +82,10 @@ struct Link {
 struct Partition {
   Lattice lattice;
   Box cells, voxels;
-  std::vector<Voxel> state;         // per voxel
-  std::vector<int> bone;            // per voxel; kNone where there is no body
-  std::vector<SkinSample> sample;   // per voxel; the skin point nearest to its middle
-  std::vector<int> part_of;         // per voxel; kNone where there is no body
+  std::vector<Voxel> state;        // per voxel
+  std::vector<int> bone;           // per voxel; kNone where there is no body
+  std::vector<SkinSample> sample;  // per voxel; the skin point nearest to its middle
+  std::vector<int> part_of;        // per voxel; kNone where there is no body
   std::vector<Part> parts;
   std::set<Link> links;
   std::vector<std::pair<int, int>> merges;  // parts of one cell that become one
@@ -99,13 +101,14 @@ struct Partition {
   }
 };
 
-/// Calls visit(neighbour) for the voxels that touch this one by a face, an edge or a corner and lie in the box.
+/// Calls visit(neighbour) for the voxels of the box that are within `reach` voxels along each axis: 1 are those that touch
+/// this one.
 template <typename Visit>
-void for_neighbours(const Box& box, int voxel, const Visit& visit) {
+void for_neighbours(const Box& box, int voxel, const Visit& visit, int reach = 1) {
   const Eigen::Vector3i here = box.place(voxel);
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
+  for (int z = -reach; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
         const Eigen::Vector3i next = here + Eigen::Vector3i(x, y, z);
         if ((x || y || z) && box.holds(next)) visit(box.index(next));
       }
@@ -116,9 +119,11 @@ void for_neighbours(const Box& box, int voxel, const Visit& visit) {
 Lattice fitted_lattice(const SkinnedMesh& skin, const Eigen::Vector3i& cells, int fine) {
   const Eigen::Vector3d low = skin.vertices.rowwise().minCoeff();
   const Eigen::Vector3d size = skin.vertices.rowwise().maxCoeff() - low;
-  // A sheet has no extent along one axis: its one cell there is 0.6 of the others' size, the sheet in its middle, or on its bottom along y.
+  // A sheet has no extent along one axis: its one cell there is 0.75 of the others' size, the sheet in its middle, or on its
+  // bottom along y.
   const double usual = size.cwiseQuotient(cells.cast<double>()).maxCoeff();
-  Lattice lattice{low, size.cwiseQuotient(cells.cast<double>()).cwiseMax(0.6 * usual), cells, fine};
+  Lattice lattice{low, size.cwiseQuotient(cells.cast<double>()), cells, fine};
+  lattice.cell_size = (cells.array() == 1).select(lattice.cell_size.cwiseMax(0.75 * usual), lattice.cell_size);
   for (int axis : {0, 2}) lattice.origin[axis] -= 0.5 * (lattice.cell_size[axis] * cells[axis] - size[axis]);
   return lattice;
 }
@@ -147,7 +152,8 @@ int main_bone(const SkinnedMesh& skin, const SkinSample& sample) {
   for (int k = 0; k < 3; ++k) {
     for (const SkinnedMesh::Influence& candidate : at(skin.skin_weights, skin.triangles(k, sample.triangle))) {
       double weight = 0;
-      for (int j = 0; j < 3; ++j) weight += sample.shares[j] * bone_weight(skin, skin.triangles(j, sample.triangle), candidate.bone);
+      for (int j = 0; j < 3; ++j)
+        weight += sample.shares[j] * bone_weight(skin, skin.triangles(j, sample.triangle), candidate.bone);
       if (weight > most || (weight == most && candidate.bone < best)) {
         most = weight;
         best = candidate.bone;
@@ -209,7 +215,25 @@ bool may_touch(const Partition& body, const LimbTable& different_limbs, int a, i
   return bone_a == kNone || bone_b == kNone || !different_limbs(bone_a, bone_b);
 }
 
-/// Parts are the connected voxels within a cell. Crumbs that the border between two limbs leaves are given to what they touch.
+/// Share of a voxel that the body fills: of the skin's, as many as its neighbours by faces that lie inside rather than
+/// outside.
+double voxel_fill(const Partition& body, int voxel) {
+  if (at(body.state, voxel) != Voxel::skin) return at(body.state, voxel) == Voxel::inside ? 1 : 0;
+  int inside = 0, outside = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int step : {-1, 1}) {
+      Eigen::Vector3i next = body.voxels.place(voxel);
+      next[axis] += step;
+      if (!body.voxels.holds(next)) continue;  // the lattice ends on the skin: what lies beyond tells nothing
+      inside += at(body.state, body.voxels.index(next)) == Voxel::inside;
+      outside += at(body.state, body.voxels.index(next)) == Voxel::outside;
+    }
+  }
+  return inside + outside == 0 ? 0.5 : static_cast<double>(inside) / (inside + outside);
+}
+
+/// Parts are the connected voxels within a cell. Crumbs that the border between two limbs leaves are given to what they
+/// touch.
 void find_parts(const LimbTable& different_limbs, Partition& body) {
   const double voxel_share = 1.0 / std::pow(body.lattice.fine, 3);
   Sets sets(body.voxels.count());
@@ -227,7 +251,7 @@ void find_parts(const LimbTable& different_limbs, Partition& body) {
   }
   std::vector<double> fill(body.state.size(), 0);
   for (int v = 0; v < body.voxels.count(); ++v) {
-    if (is_body(v)) at(fill, sets.root(v)) += voxel_share * (at(body.state, v) == Voxel::inside ? 1.0 : 0.5);
+    if (is_body(v)) at(fill, sets.root(v)) += voxel_share * voxel_fill(body, v);
   }
   for (int v = 0; v < body.voxels.count(); ++v) {
     if (!is_body(v)) continue;
@@ -251,9 +275,12 @@ void find_parts(const LimbTable& different_limbs, Partition& body) {
   }
 }
 
-/// Parts in neighbouring cells are linked where their voxels touch across the common face, straight or askew.
+/// Parts in neighbouring cells are linked where their voxels touch across the common face, straight or askew. A touch that
+/// is small for both parts is left out: where two limbs' skins coincide, a few voxels of each are taken for the other's.
 void find_links(const LimbTable& different_limbs, Partition& body) {
+  constexpr double kSmall = 0.2;  // touching voxels over the most that the part has across that face
   const int fine = body.lattice.fine;
+  std::map<Link, int> touches;
   for (int v = 0; v < body.voxels.count(); ++v) {
     if (at(body.part_of, v) == kNone) continue;
     const Eigen::Vector3i here = body.voxels.place(v);
@@ -270,35 +297,54 @@ void find_links(const LimbTable& different_limbs, Partition& body) {
                                     next[(axis + 2) % 3] / fine == here[(axis + 2) % 3] / fine;
           const int w = body.voxels.index(next);
           if (!share_a_face || at(body.part_of, w) == kNone || !may_touch(body, different_limbs, v, w)) continue;
-          body.links.insert({at(body.part_of, v), at(body.part_of, w), axis});
+          ++touches[{at(body.part_of, v), at(body.part_of, w), axis}];
         }
       }
     }
   }
+  std::map<std::pair<int, int>, int> most_above, most_below;  // per part and axis
+  for (const auto& [link, count] : touches) {
+    int& above = most_above[{link.low, link.axis}];
+    int& below = most_below[{link.high, link.axis}];
+    above = std::max(above, count);
+    below = std::max(below, count);
+  }
+  for (const auto& [link, count] : touches) {
+    if (count >= kSmall * std::min(most_above[{link.low, link.axis}], most_below[{link.high, link.axis}]))
+      body.links.insert(link);
+  }
 }
 
-/// The part whose voxel is nearest to a skin vertex; kNone where no body is near.
-int part_at(const Partition& body, const Eigen::Vector3d& point) {
+/// The part of the voxel that holds a skin point, or of the nearest around it where that is air or another limb's; kNone
+/// where there is none.
+int part_at(const Partition& body, const LimbTable& different_limbs, const Eigen::Vector3d& point, int bone) {
   const int voxel = body.voxel_at(point);
-  if (at(body.part_of, voxel) != kNone) return at(body.part_of, voxel);
   int best = kNone;
-  double nearest = std::numeric_limits<double>::infinity();
-  for_neighbours(body.voxels, voxel, [&](int neighbour) {
-    const double distance = (body.middle(neighbour) - point).squaredNorm();
-    if (at(body.part_of, neighbour) == kNone || distance >= nearest) return;
-    nearest = distance;
-    best = at(body.part_of, neighbour);
-  });
+  std::pair<bool, double> least{true, std::numeric_limits<double>::infinity()};
+  auto offer = [&](int candidate) {
+    if (at(body.part_of, candidate) == kNone) return;
+    const bool is_other_limb = at(body.bone, candidate) != kNone && different_limbs(at(body.bone, candidate), bone);
+    const std::pair<bool, double> price{is_other_limb,
+                                        candidate == voxel ? 0 : (body.middle(candidate) - point).squaredNorm()};
+    if (price >= least) return;
+    least = price;
+    best = at(body.part_of, candidate);
+  };
+  offer(voxel);
+  for_neighbours(body.voxels, voxel, offer,
+                 /*reach=*/2);  // where two limbs' skins touch, one of them owns the voxels on both sides
   return best;
 }
 
 /// How far [cells, the largest of the three] a point lies outside a cell; 0 within.
 double cells_outside(const Partition& body, const Eigen::Vector3d& point, int cell) {
-  const Eigen::Vector3d place = (point - body.lattice.origin).cwiseQuotient(body.lattice.cell_size) - body.cells.place(cell).cast<double>();
+  const Eigen::Vector3d place =
+      (point - body.lattice.origin).cwiseQuotient(body.lattice.cell_size) - body.cells.place(cell).cast<double>();
   return std::max(0.0, ((place.array() - 0.5).abs() - 0.5).maxCoeff());
 }
 
-/// Drops the parts that are a thin layer on a fuller neighbour: skin that lies on the border of two cells, give or take a voxel.
+/// Drops the parts that are a thin layer on a fuller neighbour: skin that lies on the border of two cells, give or take a
+/// voxel.
 void drop_slivers(const std::vector<int>& vertex_parts, const SkinnedMesh& skin, double least_fill, Partition& body) {
   std::vector<std::vector<int>> hosts(body.parts.size());
   for (const Link& link : body.links) {
@@ -313,12 +359,14 @@ void drop_slivers(const std::vector<int>& vertex_parts, const SkinnedMesh& skin,
   for (std::size_t p = 0; p < is_sliver.size(); ++p) is_sliver[p] = body.parts[p].fill < least_fill && !hosts[p].empty();
   for (int v = 0; v < body.voxels.count(); ++v) {
     const int part = at(body.part_of, v);
-    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] && !lies_on_a_host(part, body.middle(v), least_fill + 0.5 / body.lattice.fine))
+    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] &&
+        !lies_on_a_host(part, body.middle(v), least_fill + 0.5 / body.lattice.fine))
       is_sliver[static_cast<std::size_t>(part)] = false;
   }
   for (int v = 0; v < skin.vertices.cols(); ++v) {
     const int part = at(vertex_parts, v);
-    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] && !lies_on_a_host(part, skin.vertices.col(v), least_fill))
+    if (part != kNone && is_sliver[static_cast<std::size_t>(part)] &&
+        !lies_on_a_host(part, skin.vertices.col(v), least_fill))
       is_sliver[static_cast<std::size_t>(part)] = false;
   }
   for (std::size_t p = 0; p < is_sliver.size(); ++p) body.parts[p].kept = !is_sliver[p];
@@ -336,18 +384,21 @@ std::vector<int> find_pieces(const Partition& body) {
   return piece;
 }
 
-/// The cheapest way from one piece to any other: through parts that are there at next to nothing, through empty cells at 1 to 2 each,
-/// the fuller the cheaper. Stops are parts, or the number of parts plus the index of an empty cell.
+/// The cheapest way from one piece to any other: through parts that are there at next to nothing, through empty cells at 1
+/// to 2 each, the fuller the cheaper. Stops are parts, or the number of parts plus the index of an empty cell.
 std::vector<int> cheapest_way(const Partition& body, const std::vector<int>& piece, int from) {
   const int part_count = static_cast<int>(body.parts.size());
   std::vector<std::vector<int>> parts_in(static_cast<std::size_t>(body.cells.count()));
   std::vector<double> dropped_fill(parts_in.size(), 0);
   for (int p = 0; p < part_count; ++p) {
     const Part& part = at(body.parts, p);
-    if (part.kept) at(parts_in, part.cell).push_back(p);
-    else at(dropped_fill, part.cell) += part.fill;
+    if (part.kept)
+      at(parts_in, part.cell).push_back(p);
+    else
+      at(dropped_fill, part.cell) += part.fill;
   }
-  std::vector<double> cost(static_cast<std::size_t>(part_count + body.cells.count()), std::numeric_limits<double>::infinity());
+  std::vector<double> cost(static_cast<std::size_t>(part_count + body.cells.count()),
+                           std::numeric_limits<double>::infinity());
   std::vector<int> before(cost.size(), kNone);
   std::priority_queue<std::pair<double, int>, std::vector<std::pair<double, int>>, std::greater<>> front;
   auto offer = [&](int stop, double price, int previous) {
@@ -385,8 +436,8 @@ std::vector<int> cheapest_way(const Partition& body, const std::vector<int>& pie
   return {};
 }
 
-/// Joins all pieces into one, the lightest first, by the cheapest cells between. A piece that is farther away than it is large is dropped.
-/// Returns the number of cells added.
+/// Joins all pieces into one, the lightest first, by the cheapest cells between. A piece that is farther away than it is
+/// large is dropped. Returns the number of cells added.
 int join_pieces(Partition& body) {
   int added = 0;
   for (;;) {
@@ -398,7 +449,8 @@ int join_pieces(Partition& body) {
       ++pieces[piece[p]].second;
     }
     if (pieces.size() < 2) return added;
-    const auto lightest = std::min_element(pieces.begin(), pieces.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto lightest =
+        std::min_element(pieces.begin(), pieces.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
     std::vector<int> way = cheapest_way(body, piece, lightest->first);
     const int part_count = static_cast<int>(body.parts.size());
     const auto bridges = std::count_if(way.begin(), way.end(), [&](int stop) { return stop >= part_count; });
@@ -415,7 +467,8 @@ int join_pieces(Partition& body) {
       ++added;
     }
     for (std::size_t i = 1; i < way.size(); ++i) {
-      const auto [low, high] = std::minmax(way[i - 1], way[i], [&](int a, int b) { return at(body.parts, a).cell < at(body.parts, b).cell; });
+      const auto [low, high] =
+          std::minmax(way[i - 1], way[i], [&](int a, int b) { return at(body.parts, a).cell < at(body.parts, b).cell; });
       const Eigen::Vector3i step = body.cells.place(at(body.parts, high).cell) - body.cells.place(at(body.parts, low).cell);
       if (step.isZero()) {
         body.merges.emplace_back(low, high);
@@ -431,11 +484,11 @@ Eigen::Vector3i corner_step(int corner) { return {corner & 1, corner >> 1 & 1, c
 
 /// The cells of the body and the nodes they share: parts that share all eight corners are one cell.
 struct Cells {
-  std::vector<int> cell_of_part;            // per part; kNone where dropped
-  std::vector<int> place;                   // per cell, index in the box of cells
-  std::vector<double> fill;                 // per cell
-  std::vector<std::array<int, 8>> nodes;    // per cell
-  std::vector<Eigen::Vector3i> node_places; // per node, in the lattice's planes
+  std::vector<int> cell_of_part;             // per part; kNone where dropped
+  std::vector<int> place;                    // per cell, index in the box of cells
+  std::vector<double> fill;                  // per cell
+  std::vector<std::array<int, 8>> nodes;     // per cell
+  std::vector<Eigen::Vector3i> node_places;  // per node, in the lattice's planes
 };
 
 Cells number_cells(const Partition& body) {
@@ -454,7 +507,8 @@ Cells number_cells(const Partition& body) {
   for (int p = 0; p < part_count; ++p) {
     if (at(body.parts, p).kept) order.push_back(p);
   }
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return at(body.parts, a).cell < at(body.parts, b).cell; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return at(body.parts, a).cell < at(body.parts, b).cell; });
 
   Cells cells;
   cells.cell_of_part.assign(static_cast<std::size_t>(part_count), kNone);
@@ -522,8 +576,8 @@ void cut_into_tets(const Partition& body, const Cells& cells, ControlMesh& mesh)
 }
 
 /// The cell of each skin vertex: of its own part, or where that was dropped of the nearest part, its own limb's first.
-void assign_vertices(const std::vector<int>& vertex_parts, const SkinnedMesh& skin, const Partition& body, const Cells& cells,
-                     ControlMesh& mesh) {
+void assign_vertices(const std::vector<int>& vertex_parts, const SkinnedMesh& skin, const Partition& body,
+                     const Cells& cells, ControlMesh& mesh) {
   mesh.vertex_cells.resize(skin.vertices.cols());
   std::vector<int> kept;
   for (int p = 0; p < static_cast<int>(body.parts.size()); ++p) {
@@ -547,23 +601,25 @@ void assign_vertices(const std::vector<int>& vertex_parts, const SkinnedMesh& sk
   }
 }
 
-/// Skin weights spread into the volume: nodes take the mean of the skin samples in their tets, the square of the barycentric weight as
-/// strength, and a little of their neighbours; a node without samples takes its neighbours' mean. One sparse solve with an M-matrix, so
-/// that no weight is negative, and every node's weights sum to 1.
-Eigen::MatrixXd spread_bone_weights(const Skeleton& skeleton, const SkinnedMesh& skin, const Partition& body, const Cells& cells,
-                                    const ControlMesh& mesh) {
+/// Skin weights spread into the volume: nodes take the mean of the skin samples in their tets, the square of the barycentric
+/// weight as strength, and a little of their neighbours; a node without samples takes its neighbours' mean. One sparse solve
+/// with an M-matrix, so that no weight is negative, and every node's weights sum to 1.
+Eigen::MatrixXd spread_bone_weights(const Skeleton& skeleton, const SkinnedMesh& skin, const Partition& body,
+                                    const Cells& cells, const ControlMesh& mesh) {
   constexpr double kNeighbours = 0.02;  // strength of an edge over the mean strength of the samples at a node
   std::vector<Eigen::Vector3d> points;
   std::vector<int> point_cells, point_voxels;
   for (int v = 0; v < body.voxels.count(); ++v) {
     const SkinSample& sample = at(body.sample, v);
-    if (sample.triangle == kNone || at(body.part_of, v) == kNone || at(cells.cell_of_part, at(body.part_of, v)) == kNone) continue;
+    if (sample.triangle == kNone || at(body.part_of, v) == kNone || at(cells.cell_of_part, at(body.part_of, v)) == kNone)
+      continue;
     points.push_back(skin.vertices(Eigen::all, skin.triangles.col(sample.triangle)) * sample.shares);
     point_cells.push_back(at(cells.cell_of_part, at(body.part_of, v)));
     point_voxels.push_back(v);
   }
-  const Embedding embedding = embed(mesh, Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3, static_cast<Eigen::Index>(points.size())),
-                                    Eigen::Map<const Eigen::VectorXi>(point_cells.data(), static_cast<Eigen::Index>(point_cells.size())));
+  const Embedding embedding =
+      embed(mesh, Eigen::Map<const Eigen::Matrix3Xd>(points.front().data(), 3, static_cast<Eigen::Index>(points.size())),
+            Eigen::Map<const Eigen::VectorXi>(point_cells.data(), static_cast<Eigen::Index>(point_cells.size())));
   Eigen::VectorXd strength = Eigen::VectorXd::Zero(mesh.node_count());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(mesh.node_count(), skeleton.count());
   for (Eigen::Index p = 0; p < embedding.count(); ++p) {
@@ -591,8 +647,8 @@ Eigen::MatrixXd spread_bone_weights(const Skeleton& skeleton, const SkinnedMesh&
   return weights.array().rowwise() / weights.colwise().sum().array();
 }
 
-Partition partition_body(const Skeleton& skeleton, const SkinnedMesh& skin, const TriangleSoup& closed, const Lattice& lattice) {
-  const LimbTable different_limbs = bones_of_different_limbs(skeleton);
+Partition partition_body(const LimbTable& different_limbs, const SkinnedMesh& skin, const TriangleSoup& closed,
+                         const Lattice& lattice) {
   Partition body;
   body.lattice = lattice;
   body.cells.size = lattice.cells;
@@ -607,9 +663,12 @@ Partition partition_body(const Skeleton& skeleton, const SkinnedMesh& skin, cons
 
 ControlMesh mesh_in_lattice(const Skeleton& skeleton, const SkinnedMesh& skin, const TriangleSoup& closed, double least_fill,
                             const Lattice& lattice) {
-  Partition body = partition_body(skeleton, skin, closed, lattice);
+  const LimbTable different_limbs = bones_of_different_limbs(skeleton);
+  Partition body = partition_body(different_limbs, skin, closed, lattice);
+  const Eigen::VectorXi bones = dominant_bones(skin);
   std::vector<int> vertex_parts;
-  for (Eigen::Index v = 0; v < skin.vertices.cols(); ++v) vertex_parts.push_back(part_at(body, skin.vertices.col(v)));
+  for (Eigen::Index v = 0; v < skin.vertices.cols(); ++v)
+    vertex_parts.push_back(part_at(body, different_limbs, skin.vertices.col(v), bones[v]));
   drop_slivers(vertex_parts, skin, least_fill, body);
   ControlMesh mesh;
   mesh.bridged_cells = join_pieces(body);
@@ -621,25 +680,28 @@ ControlMesh mesh_in_lattice(const Skeleton& skeleton, const SkinnedMesh& skin, c
   return mesh;
 }
 
-/// How ill a lattice suits: nodes off the wanted number, cells that the body does not fill, cells far from cubes. Lower is better.
-/// Well-filled cells are what makes a limb one or two whole cells wide.
+/// How ill a lattice suits: nodes off the wanted number, cells that the body does not fill, cells far from cubes. Lower is
+/// better. Well-filled cells are what makes a limb one or two whole cells wide.
 double misfit(double nodes, double mean_fill, const Eigen::Vector3d& cell_size, const BodyOptions& options) {
   constexpr double kUsual = 200, kFewest = 100, kMost = 600;
   const double wanted = options.nodes > 0 ? options.nodes : kUsual;
   const double count = std::abs(std::log(nodes / wanted)) * (options.nodes > 0 ? 3.0 : 0.5);
-  const double range = options.nodes > 0 ? 0 : 10 * (std::max(0.0, std::log(kFewest / nodes)) + std::max(0.0, std::log(nodes / kMost)));
+  const double range =
+      options.nodes > 0 ? 0 : 10 * (std::max(0.0, std::log(kFewest / nodes)) + std::max(0.0, std::log(nodes / kMost)));
   return count + range + (1 - mean_fill) + 0.3 * std::log(cell_size.maxCoeff() / cell_size.minCoeff());
 }
 
-/// Nodes and mean fill that a lattice would have, counted on the middles of voxels that another lattice marked: within a few per cent.
-std::pair<double, double> estimated_body(const std::vector<Eigen::Vector3d>& middles, double voxel_volume, const Lattice& lattice,
-                                         double least_fill) {
+/// Nodes and mean fill that a lattice would have, counted on the middles of voxels that another lattice marked: within a few
+/// per cent.
+std::pair<double, double> estimated_body(const std::vector<Eigen::Vector3d>& middles, double voxel_volume,
+                                         const Lattice& lattice, double least_fill) {
   const Box cells{lattice.cells};
   const Box planes{lattice.cells.array() + 1};
   std::vector<double> fill(static_cast<std::size_t>(cells.count()), 0);
   for (const Eigen::Vector3d& middle : middles) {
     const Eigen::Vector3d place = (middle - lattice.origin).cwiseQuotient(lattice.cell_size);
-    at(fill, cells.index(place.cast<int>().cwiseMax(0).cwiseMin(lattice.cells.array().matrix() - Eigen::Vector3i::Ones()))) +=
+    at(fill,
+       cells.index(place.cast<int>().cwiseMax(0).cwiseMin(lattice.cells.array().matrix() - Eigen::Vector3i::Ones()))) +=
         voxel_volume / lattice.cell_size.prod();
   }
   std::vector<bool> used(static_cast<std::size_t>(planes.count()), false);
@@ -655,7 +717,8 @@ std::pair<double, double> estimated_body(const std::vector<Eigen::Vector3d>& mid
 }
 
 /// Lattices of near-cubic cells that span the box, the best-suited first.
-std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const TriangleSoup& closed, const BodyOptions& options) {
+std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const TriangleSoup& closed,
+                                             const BodyOptions& options) {
   constexpr double kRoughVoxels = 120;  // along the longest side
   constexpr double kLongestCell = 1.4;  // over the shortest side
   const Eigen::Vector3d size = skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff();
@@ -693,18 +756,22 @@ std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const Tria
 
 void refuse_empty(const SkinnedMesh& skin) {
   if (skin.triangles.cols() == 0 || skin.vertices.cols() == 0)
-    throw Error("", "mesh", "the skin has no triangles, so there is no body to fill", "Export the clip together with its skinned mesh.");
+    throw Error("", "mesh", "the skin has no triangles, so there is no body to fill",
+                "Export the clip together with its skinned mesh.");
   if (!skin.vertices.allFinite())
     throw Error("", "mesh", "a vertex is not a finite number", "Export the mesh again; its vertex positions are damaged.");
   if (!((skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff()).maxCoeff() > 0))
-    throw Error("", "mesh", "all vertices lie at one point, so the body has no extent", "Give the mesh a size other than 0.");
+    throw Error("", "mesh", "all vertices lie at one point, so the body has no extent",
+                "Give the mesh a size other than 0.");
 }
 
 }  // namespace
 
 std::string broken_rule(const BodyOptions& options) {
-  if (options.nodes != 0 && (options.nodes < 20 || options.nodes > 5000)) return "nodes must be 0 (automatic) or from 20 to 5000";
-  if ((options.lattice.array() != 0).any() && (options.lattice.array() < 1).any()) return "lattice must have at least one cell along each axis";
+  if (options.nodes != 0 && (options.nodes < 20 || options.nodes > 5000))
+    return "nodes must be 0 (automatic) or from 20 to 5000";
+  if ((options.lattice.array() != 0).any() && (options.lattice.array() < 1).any())
+    return "lattice must have at least one cell along each axis";
   if (options.lattice.cast<double>().prod() > 20000) return "lattice must have at most 20000 cells";
   if (!(options.least_fill >= 0 && options.least_fill <= 0.5)) return "least_fill must be from 0 to 0.5";
   return "";

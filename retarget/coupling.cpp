@@ -29,9 +29,7 @@ struct Rig {
 Rig hang_on_bones(const ControlMesh& mesh, const CouplingOptions& options) {
   Rig rig;
   rig.anchor_distance = options.anchor_distance * std::cbrt(mesh.cell_size.prod());
-  rig.directions << 1, 1, -1, -1,
-                    1, -1, 1, -1,
-                    1, -1, -1, 1;
+  rig.directions << 1, 1, -1, -1, 1, -1, 1, -1, 1, -1, -1, 1;
   rig.directions *= rig.anchor_distance / std::sqrt(3.0);
   for (int n = 0; n < mesh.node_count(); ++n) {
     const double least = std::min(options.least_weight, mesh.bone_weights.col(n).maxCoeff());
@@ -61,7 +59,8 @@ class AnchorCost : public ceres::SizedCostFunction<4, 3> {
       const double distance = way.norm();
       residuals[k] = strength * (distance - lengths[k]);
       if (!jacobians || !jacobians[0]) continue;
-      Eigen::Vector3d::Map(jacobians[0] + 3 * k) = distance > 0 ? Eigen::Vector3d(strength / distance * way) : Eigen::Vector3d::Zero();
+      Eigen::Vector3d::Map(jacobians[0] + 3 * k) =
+          distance > 0 ? Eigen::Vector3d(strength / distance * way) : Eigen::Vector3d::Zero();
     }
     return true;
   }
@@ -74,11 +73,13 @@ class EdgeCost : public ceres::SizedCostFunction<1, 3, 3> {
   double strength = 0;  // [-]
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const Eigen::Vector3d way = Eigen::Map<const Eigen::Vector3d>(parameters[0]) - Eigen::Map<const Eigen::Vector3d>(parameters[1]);
+    const Eigen::Vector3d way =
+        Eigen::Map<const Eigen::Vector3d>(parameters[0]) - Eigen::Map<const Eigen::Vector3d>(parameters[1]);
     const double distance = way.norm();
     residuals[0] = strength * (distance / length - 1);
     if (!jacobians) return true;
-    const Eigen::Vector3d slope = distance > 0 ? Eigen::Vector3d(strength / (length * distance) * way) : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d slope =
+        distance > 0 ? Eigen::Vector3d(strength / (length * distance) * way) : Eigen::Vector3d::Zero();
     if (jacobians[0]) Eigen::Vector3d::Map(jacobians[0]) = slope;
     if (jacobians[1]) Eigen::Vector3d::Map(jacobians[1]) = -slope;
     return true;
@@ -89,7 +90,11 @@ class EdgeCost : public ceres::SizedCostFunction<1, 3, 3> {
 class FrameSolver {
  public:
   FrameSolver(const ControlMesh& mesh, const Rig& rig, const CouplingOptions& options)
-      : mesh_(mesh), rig_(rig), positions_(mesh.nodes), anchors_(rig.holds.size()), edges_(static_cast<std::size_t>(mesh.edges.cols())),
+      : mesh_(mesh),
+        rig_(rig),
+        positions_(mesh.nodes),
+        anchors_(rig.holds.size()),
+        edges_(static_cast<std::size_t>(mesh.edges.cols())),
         problem_(unowned()) {
     for (std::size_t h = 0; h < anchors_.size(); ++h) {
       anchors_[h].strength = std::sqrt(rig.holds[h].weight) / rig.anchor_distance;
@@ -177,7 +182,8 @@ std::string broken_rule(const CouplingOptions& options) {
   return "";
 }
 
-CoupledMotion couple(const Character& character, const ControlMesh& mesh, const Embedding& skin_embedding, const CouplingOptions& options) {
+CoupledMotion couple(const Character& character, const ControlMesh& mesh, const Embedding& skin_embedding,
+                     const CouplingOptions& options) {
   const auto& [skeleton, skin, clip] = character;
   if (clip.frames() == 0) throw Error("", "clip '" + clip.name + "'", "the clip has no frame", "Choose a clip that moves.");
   CoupledMotion coupled;
@@ -198,7 +204,9 @@ CoupledMotion couple(const Character& character, const ControlMesh& mesh, const 
       error.converged = solver.solve(motion);
       coupled.motion.at(f) = solver.positions();
       const Eigen::VectorXd squared =
-          (embedded_positions(skin_embedding, solver.positions()) - skin_positions(skeleton, skin, pose)).colwise().squaredNorm();
+          (embedded_positions(skin_embedding, solver.positions()) - skin_positions(skeleton, skin, pose))
+              .colwise()
+              .squaredNorm();
       error.squared_sum = squared.sum();
       error.max = std::sqrt(squared.maxCoeff());
     }

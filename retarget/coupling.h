@@ -10,11 +10,11 @@
 namespace hydrostat::retarget {
 
 struct CouplingOptions {
-  double anchor_distance = 1;   // [cells] from a node to its anchors
-  double elasticity = 0.02;     // strength of an edge over that of a node's anchors
-  double least_weight = 0.05;   // bones of less weight hold no anchors of a node
-  int max_iterations = 30;      // of the solver, a frame
-  int threads = 1;              // frames are solved apart from each other: the outcome does not hang on it
+  double anchor_distance = 1;  // [cells] from a node to its anchors
+  double elasticity = 0.02;    // strength of an edge over that of a node's anchors
+  double least_weight = 0.05;  // bones of less weight hold no anchors of a node
+  int max_iterations = 30;     // of the solver, a frame
+  int threads = 1;             // frames are solved apart from each other: the outcome does not hang on it
 };
 
 /// Which value of the options breaks which rule, empty when all is well.
@@ -22,18 +22,19 @@ std::string broken_rule(const CouplingOptions& options);
 
 /// What the bones make of the control mesh over a clip.
 struct CoupledMotion {
-  Motion motion;              // F frames of the clip, at its rate, not yet a loop
-  double error_rms_length = 0;  // embedded skin against linear blend skinning, over vertices and frames, per longest side of the skin
+  Motion motion;  // F frames of the clip, at its rate, not yet a loop
+  double error_rms_length =
+      0;  // embedded skin against linear blend skinning, over vertices and frames, per longest side of the skin
   double error_max_length = 0;
-  int worst_frame = 0;        // where the largest error is
-  int unconverged_frames = 0; // frames where the solver came to its last iteration
+  int worst_frame = 0;         // where the largest error is
+  int unconverged_frames = 0;  // frames where the solver came to its last iteration
 };
 
-/// Plays the clip on the control mesh. Each node hangs on four anchors, the corners of a tetrahedron about it, on each bone that owns it, by
-/// distance constraints of the bind pose's lengths with the bone's weight as strength; anchors move with their bones. Per frame
-/// the node positions are those that minimise the constraints' errors and those of the mesh's edges, from linear blend skinning as first
-/// guess. A bone that stretches or squashes takes the lengths along. Rigid motion of all bones is reproduced exactly.
-/// skin_embedding is that of the skin's vertices. Throws Error where the clip has no frame.
+/// Plays the clip on the control mesh. Each node hangs on four anchors, the corners of a tetrahedron about it, on each bone
+/// that owns it, by distance constraints of the bind pose's lengths with the bone's weight as strength; anchors move with
+/// their bones. Per frame the node positions are those that minimise the constraints' errors and those of the mesh's edges,
+/// from linear blend skinning as first guess. A bone that stretches or squashes takes the lengths along. Rigid motion of all
+/// bones is reproduced exactly. skin_embedding is that of the skin's vertices. Throws Error where the clip has no frame.
 CoupledMotion couple(const Character& character, const ControlMesh& mesh, const Embedding& skin_embedding,
                      const CouplingOptions& options = {});
 

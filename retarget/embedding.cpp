@@ -19,8 +19,10 @@ Eigen::Vector4d barycentric(const ControlMesh& mesh, Eigen::Index tet, const Eig
 
 }  // namespace
 
-Embedding embed(const ControlMesh& mesh, const Eigen::Ref<const Eigen::Matrix3Xd>& points, const Eigen::Ref<const Eigen::VectorXi>& cells) {
-  Embedding embedding{Eigen::VectorXi(points.cols()), Eigen::Matrix4Xi(4, points.cols()), Eigen::Matrix4Xd(4, points.cols())};
+Embedding embed(const ControlMesh& mesh, const Eigen::Ref<const Eigen::Matrix3Xd>& points,
+                const Eigen::Ref<const Eigen::VectorXi>& cells) {
+  Embedding embedding{Eigen::VectorXi(points.cols()), Eigen::Matrix4Xi(4, points.cols()),
+                      Eigen::Matrix4Xd(4, points.cols())};
   for (Eigen::Index p = 0; p < points.cols(); ++p) {
     const Eigen::Vector3d low = mesh.origin + mesh.cell_size.cwiseProduct(mesh.cell_places.col(cells[p]).cast<double>());
     const Eigen::Vector3d held = points.col(p).cwiseMax(low).cwiseMin(low + mesh.cell_size);
@@ -32,13 +34,16 @@ Embedding embed(const ControlMesh& mesh, const Eigen::Ref<const Eigen::Matrix3Xd
       deepest = weights.minCoeff();
       embedding.tets[p] = tet;
       embedding.nodes.col(p) = mesh.tets.col(tet);
-      embedding.weights.col(p) = weights.cwiseMax(0) / weights.cwiseMax(0).sum();  // rounding alone: the five tets fill the cell
+      embedding.weights.col(p) =
+          weights.cwiseMax(0) / weights.cwiseMax(0).sum();  // rounding alone: the five tets fill the cell
     }
   }
   return embedding;
 }
 
-Embedding embed_skin(const ControlMesh& mesh, const SkinnedMesh& skin) { return embed(mesh, skin.vertices, mesh.vertex_cells); }
+Embedding embed_skin(const ControlMesh& mesh, const SkinnedMesh& skin) {
+  return embed(mesh, skin.vertices, mesh.vertex_cells);
+}
 
 ContactPoints contact_points(const ControlMesh& mesh, const Skeleton& skeleton, const SkinnedMesh& skin) {
   constexpr double kSpacing = 0.35;  // cells
@@ -61,7 +66,8 @@ ContactPoints contact_points(const ControlMesh& mesh, const Skeleton& skeleton, 
   std::vector<int> chosen;
   for (const int v : order) {
     const bool is_free = std::none_of(chosen.begin(), chosen.end(), [&](int other) {
-      return (skin.vertices.col(v) - skin.vertices.col(other)).squaredNorm() < spacing * spacing && !different_limbs(bones[v], bones[other]);
+      return (skin.vertices.col(v) - skin.vertices.col(other)).squaredNorm() < spacing * spacing &&
+             !different_limbs(bones[v], bones[other]);
     });
     if (is_free) chosen.push_back(v);
   }

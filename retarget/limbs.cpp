@@ -40,8 +40,9 @@ Eigen::VectorXi dominant_bones(const SkinnedMesh& skin) {
   Eigen::VectorXi bones(skin.vertices.cols());
   for (Eigen::Index v = 0; v < bones.size(); ++v) {
     const auto& influences = skin.skin_weights[static_cast<std::size_t>(v)];
-    bones[v] = std::max_element(influences.begin(), influences.end(),
-                                [](const auto& a, const auto& b) { return a.weight < b.weight; })->bone;
+    bones[v] = std::max_element(influences.begin(), influences.end(), [](const auto& a, const auto& b) {
+                 return a.weight < b.weight;
+               })->bone;
   }
   return bones;
 }

@@ -53,7 +53,8 @@ double triangle_area(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const E
   return 0.5 * (b - a).cross(c - a).norm();
 }
 
-/// Chains of edges that a single triangle uses, as welded vertices in order; a chain that does not close is closed by its chord.
+/// Chains of edges that a single triangle uses, as welded vertices in order; a chain that does not close is closed by its
+/// chord.
 std::vector<std::vector<int>> rims(const std::vector<int>& weld, const Eigen::Matrix3Xi& triangles) {
   std::map<std::pair<int, int>, int> uses;
   for (Eigen::Index t = 0; t < triangles.cols(); ++t) {
@@ -100,7 +101,8 @@ struct Flood {
 
   std::size_t index(int x, int y, int z) const {
     return static_cast<std::size_t>(x) +
-           static_cast<std::size_t>(size[0]) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(z));
+           static_cast<std::size_t>(size[0]) *
+               (static_cast<std::size_t>(y) + static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(z));
   }
 };
 
@@ -164,10 +166,12 @@ TriangleSoup with_closed_holes(const Eigen::Matrix3Xd& vertices, const Eigen::Ma
   TriangleSoup closed;
   closed.vertices.resize(3, vertices.cols() + static_cast<Eigen::Index>(middles.size()));
   closed.vertices.leftCols(vertices.cols()) = vertices;
-  for (std::size_t i = 0; i < middles.size(); ++i) closed.vertices.col(vertices.cols() + static_cast<Eigen::Index>(i)) = middles[i];
+  for (std::size_t i = 0; i < middles.size(); ++i)
+    closed.vertices.col(vertices.cols() + static_cast<Eigen::Index>(i)) = middles[i];
   closed.triangles.resize(3, triangles.cols() + static_cast<Eigen::Index>(lids.size()));
   closed.triangles.leftCols(triangles.cols()) = triangles;
-  for (std::size_t i = 0; i < lids.size(); ++i) closed.triangles.col(triangles.cols() + static_cast<Eigen::Index>(i)) = lids[i];
+  for (std::size_t i = 0; i < lids.size(); ++i)
+    closed.triangles.col(triangles.cols() + static_cast<Eigen::Index>(i)) = lids[i];
   return closed;
 }
 
@@ -178,8 +182,8 @@ std::vector<Voxel> voxelize(const TriangleSoup& soup, const Lattice& lattice) {
   mesh.points.colwise() -= lattice.origin;
   mesh.points = lattice.voxel_size().cwiseInverse().asDiagonal() * mesh.points;
   mesh.points.array() -= 0.5;
-  const openvdb::FloatGrid::Ptr distance =
-      openvdb::tools::meshToVolume<openvdb::FloatGrid>(mesh, openvdb::math::Transform(), 1.5f, 1.5f, openvdb::tools::UNSIGNED_DISTANCE_FIELD);
+  const openvdb::FloatGrid::Ptr distance = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
+      mesh, openvdb::math::Transform(), 1.5f, 1.5f, openvdb::tools::UNSIGNED_DISTANCE_FIELD);
 
   const Eigen::Vector3i count = lattice.voxels();
   Flood grid{count.array() + 2, {}};

@@ -54,7 +54,7 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
                                const std::vector<std::string>& bone_names, double length, double size,
                                const ContactOptions& options) {
   const Eigen::Index frames = points.count();
-  const Eigen::MatrixXd speed = velocities(points);
+  const Eigen::MatrixXd speed = velocities(points), neighbours = padded_frames(points, 1);
   const double reach = options.height * size;
   double squared = 0;
   for (Eigen::Index f = 0; f < frames; ++f) {
@@ -80,42 +80,42 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
         const auto x = points.at(f);
         double lowest = 1e300;
         for (const int p : members) lowest = std::min(lowest, x(1, p));
-        Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+        // Speeds of the low points towards the frame before and the one after: the first and last frame of a stance stand still
+        // on one side.
+        Eigen::Vector3d before = Eigen::Vector3d::Zero(), after = before;
         int low = 0;
         for (const int p : members) {
           if (x(1, p) > lowest + 0.3 * reach) continue;
-          velocity += speed.col(f).segment<3>(3 * p);
+          before += (neighbours.col(f + 1) - neighbours.col(f)).segment<3>(3 * p) * points.rate_hz;
+          after += (neighbours.col(f + 2) - neighbours.col(f + 1)).segment<3>(3 * p) * points.rate_hz;
           ++low;
         }
-        velocity /= low;
+        const Eigen::Vector3d velocity = (before.norm() < after.norm() ? before : after) / low;
         const double ease = previous == ContactState::kOff ? 1 : options.hysteresis;
         const double sideways = std::hypot(velocity.x(), velocity.z());
         ContactState state = ContactState::kOff;
-        if (lowest < reach * ease && std::abs(velocity.y()) < fall * ease) {
-          state = sideways < still * (previous == ContactState::kStick ? options.hysteresis : 1) ? ContactState::kStick : ContactState::kSlide;
+        if (lowest < reach * ease && std::abs(velocity.y()) < fall) {
+          state = sideways < still ? ContactState::kStick : ContactState::kSlide;
         }
         if (sideways > 0) direction.col(f) << velocity.x() / sideways, velocity.z() / sideways;
         states[static_cast<std::size_t>(f)] = previous = state;
       }
     }
-    close_short_runs(states, options.least_frames, points.loop);
     // A foot that brushes the ground on its way through is not dragged: sliding counts if it lasts.
+    std::vector<int> passing;
     for (int f = 0, count = static_cast<int>(frames); f < count; ++f) {
       if (states[static_cast<std::size_t>(f)] != ContactState::kSlide) continue;
       int begin = f, end = f;
       const auto state_at = [&](int k) { return states[static_cast<std::size_t>(((k % count) + count) % count)]; };
       while (f - begin < count && (points.loop || begin > 0) && state_at(begin - 1) == ContactState::kSlide) --begin;
       while (end - f < count && (points.loop || end < count - 1) && state_at(end + 1) == ContactState::kSlide) ++end;
-      if (end - begin + 1 < 2 * options.least_frames + 1) states[static_cast<std::size_t>(f)] = ContactState::kOff;
+      if (end - begin + 1 < 2 * options.least_frames + 1) passing.push_back(f);
     }
+    for (const int f : passing) states[static_cast<std::size_t>(f)] = ContactState::kOff;
+    close_short_runs(states, options.least_frames, points.loop);
     if (std::all_of(states.begin(), states.end(), [](ContactState s) { return s == ContactState::kOff; })) continue;
     for (Eigen::Index f = 0; f < frames; ++f) {
       if (states[static_cast<std::size_t>(f)] != ContactState::kSlide) direction.col(f).setZero();
-      if (states[static_cast<std::size_t>(f)] == ContactState::kOff) continue;
-      const auto x = points.at(f);
-      double lowest = 1e300;
-      for (const int p : members) lowest = std::min(lowest, x(1, p));
-      for (const int p : members) schedule.touching(p, f) = x(1, p) < std::max(lowest, 0.0) + reach;
     }
     schedule.patches.push_back({bone_names[static_cast<std::size_t>(bone)], members});
     schedule.state.push_back(states);
@@ -127,7 +127,21 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
     schedule.sliding_x.row(static_cast<Eigen::Index>(k)) = directions[k].row(0);
     schedule.sliding_z.row(static_cast<Eigen::Index>(k)) = directions[k].row(1);
   }
+  mark_touching(points, options.load_height * size, schedule);
   return schedule;
+}
+
+void mark_touching(const Motion& points, double height, ContactSchedule& schedule) {
+  schedule.touching.setConstant(false);
+  for (std::size_t k = 0; k < schedule.patches.size(); ++k) {
+    for (Eigen::Index f = 0; f < points.count(); ++f) {
+      if (schedule.state[k][static_cast<std::size_t>(f)] == ContactState::kOff) continue;
+      const auto x = points.at(f);
+      double lowest = 1e300;
+      for (const int p : schedule.patches[k].points) lowest = std::min(lowest, x(1, p));
+      for (const int p : schedule.patches[k].points) schedule.touching(p, f) = x(1, p) <= std::max(lowest, 0.0) + height;
+    }
+  }
 }
 
 }  // namespace hydrostat::retarget

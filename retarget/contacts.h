@@ -29,8 +29,9 @@ struct ContactSchedule {
 
 struct ContactOptions {
   double height = 0.03;        // per D: a patch touches below this
-  double hysteresis = 1.5;     // on height and speed, while it touches
-  double still_speed = 0.3;    // of the RMS speed of all points: slower sticks
+  double hysteresis = 1.5;     // on height, while it touches
+  double load_height = 0.01;   // per D above the patch's lowest point: what lies higher bears no load
+  double still_speed = 0.15;   // of the RMS speed of all points: slower, to the frame before or after, sticks
   double least_still_speed = 0.02;  // of sqrt(g L)
   double fall_speed = 0.12;    // of sqrt(g L): a patch that rises or sinks faster does not touch
   int least_frames = 3;        // shorter contacts and gaps are closed
@@ -45,6 +46,9 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
 /// Height [m] of the ground under a motion: the level on which its lowest points rest, the 20th percentile over the frames
 /// of the lowest point.
 double ground_height(const Motion& points);
+
+/// Marks as touching the points of patches in contact that lie lower than `height` [m] in `points`, at least the lowest.
+void mark_touching(const Motion& points, double height, ContactSchedule& schedule);
 
 /// The motion of contact points carried by nodes.
 Motion point_motion(const physics::ContactPoints& points, const Motion& nodes);

@@ -14,7 +14,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kGravity = 9.81;
-constexpr double kEdgeShare = 0.02;      // of the springs that the volume step keeps, against folding
+constexpr double kEdgeShare = 0.02;      // of the springs, at rest in the animator's shape, that the volume step keeps against folding
 constexpr double kTether = 0.2;          // of E / (rho L^2) [1/s2]: pull back to the animator's shape
 constexpr double kHold = 1000;           // a contact's pull over a node's tether
 constexpr double kBalanceWeight = 60;    // W: per mg of missing force
@@ -89,26 +89,33 @@ std::vector<std::vector<Hold>> find_holds(const ContactSchedule& contacts, const
 class ShapeProjector {
  public:
   ShapeProjector(const physics::Scene& scene, double length, double youngs_over_density)
-      : scene_(scene), body_(scene.body), matrix_(scene.body), ones_(Eigen::VectorXd::Ones(scene.body.edge_count())) {
+      : scene_(scene), body_(scene.body), matrix_(scene.body) {
     body_.edge_stiffness *= kEdgeShare;
     tether_ = kTether * youngs_over_density / (length * length);
+    // Light limbs are held to their shape as firmly as the trunk.
+    body_.mass.setConstant(body_.mass.mean());
     hold_ = kHold * tether_ * body_.mass.mean();
   }
 
-  Eigen::Matrix3Xd project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, bool keep_volume) {
+  /// `floor` [m]: the least height of each contact point.
+  Eigen::Matrix3Xd project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor, bool keep_volume) {
     if (!keep_volume) body_.volume_stiffness.setZero();
+    shape_.resize(body_.edge_count());
+    for (int e = 0; e < body_.edge_count(); ++e) {
+      shape_[e] = (target.col(body_.edges(1, e)) - target.col(body_.edges(0, e))).norm() / body_.rest_length[e];
+    }
     Eigen::Matrix3Xd x = target;
-    double energy = energy_of(x, target, holds);
+    double energy = energy_of(x, target, holds, floor);
     for (int iteration = 0; iteration < 12; ++iteration) {
       Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, x.cols());
-      physics::add_elastic_forces(body_, x, ones_, force);
+      physics::add_elastic_forces(body_, x, shape_, force);
       for (int i = 0; i < x.cols(); ++i) force.col(i) -= tether_ * body_.mass[i] * (x.col(i) - target.col(i));
       matrix_.set_zero();
       matrix_.add_mass(body_, tether_);
-      matrix_.add_stiffness(body_, x, ones_, 1);
+      matrix_.add_stiffness(body_, x, shape_, 1);
       for (const Hold& hold : holds) pull(hold.point, error_of(hold, x), hold.sideways, force);
       for (int p = 0; p < scene_.contact_points.count(); ++p) {
-        const double height = scene_.contact_points.of(x, p).y();
+        const double height = scene_.contact_points.of(x, p).y() - floor[p];
         if (height < 0) pull(p, Eigen::Vector3d(0, height, 0), false, force);
       }
       if (!matrix_.factor()) break;
@@ -118,7 +125,7 @@ class ShapeProjector {
       double scale = 1;
       for (; scale > 1e-3; scale /= 2) {
         const Eigen::Matrix3Xd trial = x + scale * move;
-        const double trial_energy = energy_of(trial, target, holds);
+        const double trial_energy = energy_of(trial, target, holds, floor);
         if (trial_energy < energy) {
           x = trial;
           energy = trial_energy;
@@ -136,12 +143,13 @@ class ShapeProjector {
     if (!hold.sideways) error.x() = error.z() = 0;
     return error;
   }
-  double energy_of(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds) const {
-    double energy = physics::elastic_energy(body_, x, ones_);
+  double energy_of(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds,
+                   const Eigen::VectorXd& floor) const {
+    double energy = physics::elastic_energy(body_, x, shape_);
     energy += 0.5 * tether_ * ((x - target).colwise().squaredNorm() * body_.mass)(0);
     for (const Hold& hold : holds) energy += 0.5 * hold_ * error_of(hold, x).squaredNorm();
     for (int p = 0; p < scene_.contact_points.count(); ++p) {
-      const double height = scene_.contact_points.of(x, p).y();
+      const double height = scene_.contact_points.of(x, p).y() - floor[p];
       if (height < 0) energy += 0.5 * hold_ * height * height;
     }
     return energy;
@@ -158,7 +166,7 @@ class ShapeProjector {
   const physics::Scene& scene_;
   physics::Body body_;
   physics::SystemMatrix matrix_;
-  Eigen::VectorXd ones_;
+  Eigen::VectorXd shape_;  // activation for which the animator's shape has no stress
   double tether_ = 0, hold_ = 0;
 };
 
@@ -366,20 +374,38 @@ Motion shifted(const Motion& motion, const Shift& shift, const physics::Body& bo
   return result;
 }
 
-/// Projects all frames and smooths what the projection changed over time, then projects once more lightly.
-Motion project_frames(const Motion& motion, const std::vector<std::vector<Hold>>& holds, ShapeProjector& projector,
-                      bool keep_volume, double smooth_hz) {
+/// Least heights of the contact points over the frames [m], P x F: 0 in contact, `clearance` away from it, fading between.
+Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double clearance, int fade) {
+  const long frames = contacts.touching.cols();
+  Eigen::MatrixXd floor = Eigen::MatrixXd::Zero(contacts.touching.rows(), frames);
+  for (std::size_t k = 0; k < contacts.patches.size(); ++k) {
+    for (long f = 0; f < frames; ++f) {
+      long away = fade;
+      for (long d = -fade; d <= fade; ++d) {
+        long g = f + d;
+        if (loop) g = ((g % frames) + frames) % frames;
+        if (g < 0 || g >= frames) continue;
+        if (contacts.state[k][static_cast<std::size_t>(g)] != ContactState::kOff) away = std::min(away, std::labs(d));
+      }
+      const double share = static_cast<double>(away) / fade;
+      for (const int p : contacts.patches[k].points) floor(p, f) = clearance * share * share;
+    }
+  }
+  return floor;
+}
+
+/// Projects all frames, twice with what the projection changed smoothed over time, then once more so that contacts hold.
+Motion project_frames(const Motion& motion, const std::vector<std::vector<Hold>>& holds, const Eigen::MatrixXd& floor,
+                      ShapeProjector& projector, bool keep_volume, double smooth_hz) {
   Motion result = motion;
-  for (int pass = 0; pass < 2; ++pass) {
+  for (int pass = 0; pass < 3; ++pass) {
     Motion change = motion;
     for (Eigen::Index f = 0; f < motion.count(); ++f) {
-      const Eigen::Matrix3Xd shape = projector.project(result.at(f), holds[static_cast<std::size_t>(f)], keep_volume);
+      const Eigen::Matrix3Xd shape = projector.project(result.at(f), holds[static_cast<std::size_t>(f)], floor.col(f), keep_volume);
       change.at(f) = shape - motion.at(f);
     }
-    // The change alone is smoothed; it does not travel with the loop.
-    change.travel.setZero();
-    const Motion smoothed = smooth(change, smooth_hz);
-    result.frames = motion.frames + smoothed.frames;
+    change.travel.setZero();  // the change alone is smoothed; it does not travel with the loop
+    result.frames = motion.frames + (pass < 2 ? smooth(change, smooth_hz) : change).frames;
   }
   return result;
 }
@@ -438,13 +464,15 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   Motion target = smooth(coupled, options.smooth_hz);
   report.smooth_shift_rms_length = rms_difference(target, coupled, body.mass) / length;
 
-  Motion points = point_motion(scene.contact_points, target);
+  Motion points = point_motion(scene.contact_points, coupled);
   const double ground = ground_height(points);
   for (Eigen::Index r = 1; r < target.frames.rows(); r += 3) target.frames.row(r).array() -= ground;
   for (Eigen::Index r = 1; r < points.frames.rows(); r += 3) points.frames.row(r).array() -= ground;
   const Motion grounded = target;
   result.contacts = label_contacts(points, patch_bone, bone_names, length, size, options.contacts);
   const std::vector<std::vector<Hold>> holds = find_holds(result.contacts, points);
+  const Eigen::MatrixXd floor = floors(result.contacts, target.loop, options.clearance * size, options.clearance_frames);
+  points = point_motion(scene.contact_points, target);
 
   // The foot lock's offset of each patch moves its bone's nodes and fades out over the frames around the contact.
   std::map<std::string, Eigen::Index> bone_index;
@@ -465,6 +493,9 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
         ++count;
       }
       if (count > 0) offset.frames.col(f) /= count;
+      if (count == 0) {
+        for (const int p : patch.points) offset.frames(1, f) = std::max(offset.frames(1, f), floor(p, f) - points.at(f)(1, p));
+      }
     }
     offset = smooth(offset, options.smooth_hz);
     const Eigen::Index bone = bone_index.at(patch.name);
@@ -477,15 +508,18 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   const double youngs_over_density = length * kGravity / 0.005;
   ShapeProjector projector(scene, length, youngs_over_density);
   const Motion locked = target;
-  target = project_frames(locked, holds, projector, options.volume, options.smooth_hz);
+  target = project_frames(locked, holds, floor, projector, options.volume, options.smooth_hz);
   report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
+  const auto remark = [&] { mark_touching(point_motion(scene.contact_points, target), 0.3 * options.contacts.load_height * size, result.contacts); };
+  remark();
   const Motion before_momentum = target;
   if (options.momentum) {
     Motion wanted = locked;  // the animator's shape with the shifts so far
     for (int round = 0; round < options.rounds; ++round) {
       const Shift shift = balance(target, scene, result.contacts, length, options.support_friction, true);
       wanted = shifted(wanted, shift, body);
-      target = project_frames(wanted, holds, projector, options.volume, options.smooth_hz);
+      target = project_frames(wanted, holds, floor, projector, options.volume, options.smooth_hz);
+      remark();
     }
   }
   report.momentum_shift_rms_length = rms_difference(target, before_momentum, body.mass) / length;

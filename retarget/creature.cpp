@@ -11,6 +11,8 @@ namespace {
 constexpr double kGravity = 9.81;
 constexpr double kLargest = 30, kSmallest = 0.01;  // [m] of a creature's longest extent
 constexpr double kLoopTolerance = 0.02;            // of L
+constexpr double kOwnTravel = 0.05;                // of L: less is a clip in place, which is there to be repeated
+constexpr double kFlight = 0.05;                   // of D above the ground
 
 void scale_character(Character& character, double scale) {
   const auto scaled = [scale](const Eigen::Affine3d& pose) {
@@ -81,7 +83,9 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   }
   Eigen::VectorXd mass = Eigen::VectorXd::Zero(nodes + points);
   mass.head(nodes) = creature.scene.body.mass;
+  const Motion clip = both;
   both = close_loop(both, mass, kLoopTolerance * creature.length);
+  if (both.travel.norm() > kOwnTravel * creature.length && was_made_to_be_played_once(clip, mass, kFlight * creature.size)) both = clip;
   Motion skin_points = both;
   skin_points.frames = both.frames.bottomRows(3 * points);
   const RootMotionResult root = recover_root_motion(skin_points, creature.length, options.root_motion);

@@ -3,6 +3,23 @@
 #include <cmath>
 
 namespace hydrostat::retarget {
+namespace {
+
+constexpr double kRestSpeed = 0.1;  // of the clip's RMS speed
+
+}  // namespace
+
+bool was_made_to_be_played_once(const Motion& frames, const Eigen::VectorXd& mass, double flight_height) {
+  const Eigen::Index intervals = frames.count() - 1;
+  Eigen::VectorXd squared_speed(intervals), lowest(intervals + 1);
+  for (Eigen::Index f = 0; f < intervals; ++f) {
+    squared_speed[f] = ((frames.at(f + 1) - frames.at(f)).colwise().squaredNorm() * mass)(0);
+  }
+  for (Eigen::Index f = 0; f <= intervals; ++f) lowest[f] = frames.at(f).row(1).minCoeff();
+  const double rest = kRestSpeed * kRestSpeed * squared_speed.mean();
+  const double ground = std::max(lowest[0], lowest[intervals]);
+  return squared_speed[0] < rest && squared_speed[intervals - 1] < rest && lowest.maxCoeff() > ground + flight_height;
+}
 
 Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tolerance, double* defect_out) {
   const Eigen::Index last = frames.count() - 1;

@@ -10,4 +10,8 @@ namespace hydrostat::retarget {
 /// `mass` weighs the points, N.
 Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tolerance, double* defect = nullptr);
 
+/// Whether the clip begins and ends in stillness and is in the air between, by `flight_height` [m]: a jump, which is no loop
+/// though its last pose may be its first.
+bool was_made_to_be_played_once(const Motion& frames, const Eigen::VectorXd& mass, double flight_height);
+
 }  // namespace hydrostat::retarget

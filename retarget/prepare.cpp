@@ -20,7 +20,11 @@ constexpr double kHold = 1000;           // a contact's pull over a node's tethe
 constexpr double kBalanceWeight = 60;    // W: per mg of missing force
 constexpr double kShiftWeight = 1;       // per L of shift of the COM, per radian of the trunk
 constexpr double kBendWeight = 2;        // per L (radian) of third difference, at 60 Hz
-constexpr double kForceWeight = 0.03;    // per mg of contact force
+constexpr double kForceWeight = 0.03;    // per mg of contact force, in the midst of a stance
+constexpr double kEdgeForceWeight[] = {0.25, 0.12, 0.06};  // in its first and last frames: loads come and go gently
+
+constexpr double kGoodBalance = 0.02;    // badness (missing force per weight + shift per L) that needs no more contacts
+constexpr double kWorseBalance = 1.5;    // times the least badness: fewer contacts are preferred up to here
 
 double rms_difference(const Motion& a, const Motion& b, const Eigen::VectorXd& mass) {
   double sum = 0;
@@ -231,6 +235,21 @@ std::vector<ContactGenerator> outer_generators(const std::vector<ContactGenerato
   return result;
 }
 
+/// How many frames lie between frame f and the beginning or end of the stance of a point's patch, 3 at most.
+int frames_from_edge(const ContactSchedule& contacts, int point, long f, bool loop) {
+  const long frames = contacts.touching.cols();
+  for (std::size_t k = 0; k < contacts.patches.size(); ++k) {
+    if (!std::binary_search(contacts.patches[k].points.begin(), contacts.patches[k].points.end(), point)) continue;
+    for (int d = 1; d <= 3; ++d) {
+      for (const long g : {f - d, f + d}) {
+        if (!loop && (g < 0 || g >= frames)) continue;
+        if (contacts.state[k][static_cast<std::size_t>((g + frames) % frames)] == ContactState::kOff) return d - 1;
+      }
+    }
+  }
+  return 3;
+}
+
 /// Shift of the COM and turn of the trunk per frame.
 struct Shift {
   Eigen::MatrixXd move, turn;      // 3 x F [m], [rad]
@@ -239,7 +258,7 @@ struct Shift {
 
 /// Solves for shift, turn and contact forces together; with `may_shift` false for the contact forces alone.
 Shift balance(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-              double support_friction, bool may_shift) {
+              double support_friction, bool may_shift, int max_pivots = 60) {
   const long frames = target.count();
   const double weight = scene.body.mass.sum() * kGravity, mass = scene.body.mass.sum();
   const Centroidal now = centroidal(target, scene.body);
@@ -318,7 +337,9 @@ Shift balance(const Motion& target, const physics::Scene& scene, const ContactSc
     for (int r = 0; r < 3; ++r) target_rows.push_back(-w / length * now.spin_rate(r, f));
     end_block(6);
     for (long k = alpha_column; k < column; ++k) {
-      entries.emplace_back(row, k, kForceWeight);
+      const int point = generators[static_cast<std::size_t>(f)][static_cast<std::size_t>(k - alpha_column)].point;
+      const int age = std::min<int>(frames_from_edge(contacts, point, f, target.loop), 3);
+      entries.emplace_back(row, k, may_shift && age < 3 ? kEdgeForceWeight[age] : kForceWeight);
       target_rows.push_back(0);
       end_block(1);
     }
@@ -341,7 +362,7 @@ Shift balance(const Motion& target, const physics::Scene& scene, const ContactSc
   problem.lower.tail(columns - shift_columns).setZero();
   Eigen::VectorXd start = Eigen::VectorXd::Zero(columns);
   start.tail(columns - shift_columns).setConstant(1e-3);
-  const BoundedSolution solution = solve(problem, start, 60);
+  const BoundedSolution solution = solve(problem, start, max_pivots);
 
   Shift shift;
   shift.move = shift.turn = Eigen::MatrixXd::Zero(3, frames);
@@ -357,6 +378,30 @@ Shift balance(const Motion& target, const physics::Scene& scene, const ContactSc
     block += 1 + static_cast<long>(generators[static_cast<std::size_t>(f)].size()) + (may_shift ? 1 : 0);
   }
   return shift;
+}
+
+/// Labels at the smallest of a few heights that lets the body stand: what hovers a little higher was meant to bear weight where
+/// the clip cannot be balanced without it (a worm's dragged end). Badness counts missing force per weight and shift per L.
+ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, const physics::Scene& scene, const std::vector<int>& patch_bone,
+                                const std::vector<std::string>& bone_names, double length, double size, const PrepareOptions& options) {
+  std::vector<ContactSchedule> schedules;
+  std::vector<double> badness;
+  for (const double factor : {1.0, 2.0, 3.5, 5.0}) {
+    ContactOptions contact_options = options.contacts;
+    contact_options.height *= factor;
+    schedules.push_back(label_contacts(points, patch_bone, bone_names, length, size, contact_options));
+    const Shift shift = balance(grounded, scene, schedules.back(), length, options.support_friction, true, 12);
+    const double frames = static_cast<double>(grounded.count());
+    badness.push_back(std::sqrt(shift.missing_wrench.topRows<3>().squaredNorm() / frames) +
+                      std::sqrt(shift.missing_wrench.bottomRows<3>().squaredNorm() / frames) +
+                      std::sqrt(shift.move.squaredNorm() / frames) / length);
+    if (getenv("HYDBG")) fprintf(stderr,"height %g bad %g\n",factor,badness.back());
+    if (badness.back() < kGoodBalance) break;
+  }
+  const double least = *std::min_element(badness.begin(), badness.end());
+  std::size_t chosen = 0;
+  while (badness[chosen] > std::max(kGoodBalance, kWorseBalance * least)) ++chosen;
+  return schedules[chosen];
 }
 
 /// Node by node, how far it follows a move of the trunk: nodes near holding patches stay.
@@ -408,6 +453,33 @@ Motion project_frames(const Motion& motion, const std::vector<std::vector<Hold>>
     result.frames = motion.frames + (pass < 2 ? smooth(change, smooth_hz) : change).frames;
   }
   return result;
+}
+
+/// Moves every frame of a flight as a whole so that the COM falls freely between the last and the first frame in contact.
+/// A rigid move leaves volume and shape as they are, and in flight no foot holds it back.
+void fall_freely(const ContactSchedule& contacts, const physics::Scene& scene, Motion& motion) {
+  const long frames = motion.count();
+  const Eigen::VectorXd shares = scene.body.mass / scene.body.mass.sum();
+  const Eigen::Vector3d step = scene.gravity / (motion.rate_hz * motion.rate_hz);
+  const auto flying = [&](long f) { return !contacts.touching.col(((f % frames) + frames) % frames).any(); };
+  const auto com = [&](long f) -> Eigen::Vector3d {  // f may lie one period on
+    const Eigen::Vector3d c = motion.at(f % frames) * shares;
+    return after_cycles(motion, f / frames) * c;
+  };
+  for (long f = 0; f < frames; ++f) {
+    if (flying(f) || !flying(f + 1) || (!motion.loop && f + 1 >= frames)) continue;
+    long end = f + 1;
+    while (flying(end) && (motion.loop || end < frames)) ++end;
+    if (!motion.loop && end >= frames) continue;  // it never lands
+    const Eigen::Vector3d from = com(f), to = com(end);
+    const double count = static_cast<double>(end - f);
+    for (long g = f + 1; g < end; ++g) {
+      const double k = static_cast<double>(g - f);
+      const Eigen::Vector3d wanted = from + (to - from) * (k / count) + 0.5 * k * (k - count) * step;
+      const Eigen::Vector3d move = after_cycles(motion, g / frames).linear().transpose() * (wanted - com(g));
+      for (Eigen::Index i = 0; i < shares.size(); ++i) motion.at(g % frames).col(i) += move;
+    }
+  }
 }
 
 }  // namespace
@@ -469,7 +541,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   for (Eigen::Index r = 1; r < target.frames.rows(); r += 3) target.frames.row(r).array() -= ground;
   for (Eigen::Index r = 1; r < points.frames.rows(); r += 3) points.frames.row(r).array() -= ground;
   const Motion grounded = target;
-  result.contacts = label_contacts(points, patch_bone, bone_names, length, size, options.contacts);
+  result.contacts = choose_contacts(target, points, scene, patch_bone, bone_names, length, size, options);
   const std::vector<std::vector<Hold>> holds = find_holds(result.contacts, points);
   const Eigen::MatrixXd floor = floors(result.contacts, target.loop, options.clearance * size, options.clearance_frames);
   points = point_motion(scene.contact_points, target);
@@ -519,6 +591,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
       const Shift shift = balance(target, scene, result.contacts, length, options.support_friction, true);
       wanted = shifted(wanted, shift, body);
       target = project_frames(wanted, holds, floor, projector, options.volume, options.smooth_hz);
+      fall_freely(result.contacts, scene, target);
       remark();
     }
   }

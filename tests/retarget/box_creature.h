@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "retarget/clip.h"
 #include "retarget/prepare.h"
 #include "tests/physics/lattice_scene.h"
 
@@ -11,7 +12,7 @@ namespace hydrostat::retarget {
 
 //     +-----------+       z
 //    /           /|      /
-//   +-----------+ +     +--> x      5 x 2 x 3 cells of 0.1 m on four legs of one cell: 88 nodes, L = 0.5 m, mirrored in z
+//   +-----------+ +     +--> x      5 x 2 x 4 cells of 0.1 m on four legs of one cell: 106 nodes, L = 0.5 m, its own mirror image in z
 //   |   trunk   |/
 //   +-+-------+-+
 //   |_|       |_|
@@ -29,24 +30,24 @@ struct BoxCreature {
 
 inline BoxCreature make_box_creature() {
   BoxCreature creature;
-  const auto keep = [](int i, int j, int k) { return j >= 1 || ((i == 0 || i == 4) && k != 1); };
+  const auto keep = [](int i, int j, int k) { return j >= 1 || ((i == 0 || i == 4) && (k == 0 || k == 3)); };
   physics::Material material;
   material.youngs_modulus = material.density * 9.81 * BoxCreature::kLength / 0.005;
-  const physics::Body body = physics::body_of(physics::make_lattice(5, 3, 3, 0.1, keep), material);
+  const physics::Body body = physics::body_of(physics::make_lattice(5, 3, 4, 0.1, keep), material);
   creature.scene = physics::scene_of(body, physics::soles(body));
   creature.skeleton.names = {"trunk", "back_right", "back_left", "front_right", "front_left"};
   creature.skeleton.parents = {-1, 0, 0, 0, 0};
   creature.skeleton.weighted.assign(5, true);
   creature.skeleton.bind_pose.assign(5, Eigen::Affine3d::Identity());
-  creature.skeleton.bind_pose[0].translation() << 0, 0.2, 0.15;
-  const auto leg_of = [](double x, double z) { return 1 + (x > 0.25 ? 2 : 0) + (z > 0.15 ? 1 : 0); };
+  creature.skeleton.bind_pose[0].translation() << 0, 0.2, 0.2;
+  const auto leg_of = [](double x, double z) { return 1 + (x > 0.25 ? 2 : 0) + (z > 0.2 ? 1 : 0); };
   for (int leg = 1; leg < 5; ++leg) {
-    creature.skeleton.bind_pose[static_cast<std::size_t>(leg)].translation() << (leg > 2 ? 0.45 : 0.05), 0.15, (leg % 2 == 0 ? 0.25 : 0.05);
+    creature.skeleton.bind_pose[static_cast<std::size_t>(leg)].translation() << (leg > 2 ? 0.45 : 0.05), 0.15, (leg % 2 == 0 ? 0.35 : 0.05);
   }
   creature.bone_weights = Eigen::MatrixXd::Zero(5, body.node_count());
   for (int i = 0; i < body.node_count(); ++i) {
     const Eigen::Vector3d place = body.rest.col(i);
-    const bool over_a_leg = (place.x() < 0.15 || place.x() > 0.35);
+    const bool over_a_leg = (place.x() < 0.15 || place.x() > 0.35) && std::abs(place.z() - 0.2) > 0.05;
     const double share = place.y() < 0.05 ? 1 : place.y() < 0.15 && over_a_leg ? 0.5 : 0;
     creature.bone_weights(leg_of(place.x(), place.z()), i) = share;
     creature.bone_weights(0, i) += 1 - share;

@@ -56,7 +56,7 @@ TEST(Corrector, DoesNothingOnTheNominalPath) {
 
 TEST(Corrector, PushesBackAgainstAnErrorOfVelocity) {
   const Controlled controlled;
-  for (const Eigen::Vector3d direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0), Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+  for (const Eigen::Vector3d& direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0), Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
     SCOPED_TRACE(::testing::Message() << "error along " << direction.transpose());
     physics::State state = controlled.rest;
     state.v.colwise() += 0.2 * direction;
@@ -69,7 +69,7 @@ TEST(Corrector, PushesBackAgainstAnErrorOfVelocity) {
 
 TEST(Corrector, PushesBackAgainstAnErrorOfPlace) {
   const Controlled controlled;
-  for (const Eigen::Vector3d direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, -1)}) {
+  for (const Eigen::Vector3d& direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, -1)}) {
     physics::State reference = controlled.rest;
     reference.x.colwise() -= 0.02 * direction;
     Corrector corrector = controlled.corrector();

@@ -20,6 +20,12 @@ InverseDynamics solve_standing(const BoxCreature& creature, const Motion& motion
   return solve_inverse_dynamics(as_prepared(motion, always_standing(creature, motion.count())), creature.scene, kLength, options);
 }
 
+/// A place in the box made longer along y by `share`, of the same volume.
+Eigen::Vector3d stretched(const Eigen::Vector3d& x, double share) {
+  const double across = 1 / std::sqrt(1 + share);
+  return {across * x.x(), (1 + share) * x.y(), across * x.z()};
+}
+
 /// One frame of the free body under the solved activations and contact forces, from the target's state at frame f: how far it is from the
 /// target's next frame [m], mass-weighted RMS.
 double one_frame_error(const BoxCreature& creature, const Motion& target, const InverseDynamics& inverse, Eigen::Index f) {
@@ -100,16 +106,17 @@ TEST(InverseDynamics, DoNotHangOnTheNumberOfThreads) {
 
 TEST(InverseDynamics, FromTheirForcesTheFreeBodyMovesAsTheTargetDoes) {
   const BoxCreature creature = make_box_creature();
-  // The target steadily rises and bends its trunk at once, from rest.
-  const Motion motion = played(creature, 7, false, [](const Eigen::Vector3d& x, Eigen::Index f) {
+  // Held out of its rest shape the target is hurled up and forward, ever faster.
+  const Eigen::Vector3d acceleration(2, 3, 0);
+  const Motion motion = played(creature, 7, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
     const double t = static_cast<double>(f) / 60;
-    return Eigen::Vector3d(x + 0.5 * t * t * Eigen::Vector3d(0, 3 + 8 * std::sin(6 * x.x()) * x.y(), 4 * x.y()));
+    return Eigen::Vector3d(stretched(x, 0.05) + 0.5 * t * t * acceleration);
   });
   const InverseDynamics inverse = solve_standing(creature, motion);
-  const double ts = 1.0 / 60;
-  const double moved = 0.5 * ts * ts * 3;  // [m] what the acceleration alone makes in a frame
+  const double moved = 0.5 * acceleration.norm() / 3600;  // [m] what the acceleration makes in a frame
   for (const Eigen::Index f : {2, 3, 4}) {
-    EXPECT_LT(one_frame_error(creature, motion, inverse, f), std::max(10 * inverse.miss[f], 0.1 * moved)) << "frame " << f;
+    const double error = one_frame_error(creature, motion, inverse, f);
+    EXPECT_LT(error, std::max(10 * inverse.miss[f], 0.05 * moved)) << "frame " << f << ", predicted " << inverse.miss[f];
   }
 }
 
@@ -155,19 +162,17 @@ TEST(InverseDynamics, SmoothnessTakesJumpsOutOfTheActivations) {
 }
 
 TEST(InverseDynamics, WishForTheKinematicActivation) {
-  // Two states of self-stress balance alike: of all that carry the weight, the one nearest to the target's own lengths is taken.
+  // The constraints are more than the nodes can tell apart: of all that balance, those nearest to the target's own lengths are
+  // taken, and what they differ in carries the weight alone.
   const BoxCreature creature = make_box_creature();
-  const Motion motion = bobbing(creature, 8, 0.08);
-  const InverseDynamics inverse = solve_standing(creature, motion);
+  const Motion motion = played(creature, 3, true, [](const Eigen::Vector3d& x, Eigen::Index) { return stretched(x, 0.06); });
+  const Eigen::VectorXd upright = solve_standing(creature, motion).activation.col(1);
   const physics::Body& body = creature.scene.body;
-  const Eigen::Index f = 2;  // the highest
-  double with = 0, squared = 0;
+  Eigen::VectorXd wish(body.edge_count());
   for (int e = 0; e < body.edge_count(); ++e) {
-    const double wish = (motion.at(f).col(body.edges(0, e)) - motion.at(f).col(body.edges(1, e))).norm() / body.rest_length[e] - 1;
-    with += wish * (inverse.activation(e, f) - 1);
-    squared += wish * wish;
+    wish[e] = (motion.at(1).col(body.edges(0, e)) - motion.at(1).col(body.edges(1, e))).norm() / body.rest_length[e];
   }
-  EXPECT_NEAR(with / squared, 1, 0.3);
+  EXPECT_GT((wish.array() - 1).matrix().norm(), 5 * (upright - wish).norm());
 }
 
 TEST(AutomaticLimit, IsThe99thPercentileWithinItsBounds) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <limits>
 #include <random>
 #include <string>
@@ -73,8 +74,12 @@ void expect_optimal(const BoundedLeastSquares& problem, const BoundedSolution& s
   const Eigen::VectorXd gradient = problem.jacobian.transpose() * (problem.jacobian * solution.x - problem.target);
   const double slack = 1e-7 * (problem.jacobian.transpose() * problem.target).lpNorm<Eigen::Infinity>();
   for (Eigen::Index c = 0; c < solution.x.size(); ++c) {
-    if (solution.x[c] > problem.lower[c]) EXPECT_LT(gradient[c], slack) << "entry " << c << " would gain by shrinking";
-    if (solution.x[c] < problem.upper[c]) EXPECT_GT(gradient[c], -slack) << "entry " << c << " would gain by growing";
+    if (solution.x[c] > problem.lower[c]) {
+      EXPECT_LT(gradient[c], slack) << "entry " << c << " would gain by shrinking";
+    }
+    if (solution.x[c] < problem.upper[c]) {
+      EXPECT_GT(gradient[c], -slack) << "entry " << c << " would gain by growing";
+    }
   }
 }
 
@@ -86,7 +91,9 @@ TEST(BoundedLeastSquares, MeetsTheConditionsOfKarushKuhnAndTucker) {
     expect_optimal(problem, solution);
     int clamped = 0;
     for (Eigen::Index c = 0; c < solution.x.size(); ++c) clamped += solution.x[c] == problem.lower[c] || solution.x[c] == problem.upper[c];
-    if (seed > 2) EXPECT_GT(clamped, 0);
+    if (seed > 2) {
+      EXPECT_GT(clamped, 0);
+    }
   }
 }
 

@@ -38,7 +38,9 @@ TEST(Muscles, ActInTheirRegionAlone) {
     EXPECT_NEAR(field.cwiseAbs().maxCoeff(), 1, 1e-12);
     for (int e = 0; e < body.edge_count(); ++e) {
       const double owned = creature.bone_weights(bone, body.edges(0, e)) + creature.bone_weights(bone, body.edges(1, e));
-      if (owned == 0) EXPECT_EQ(field[e], 0) << "constraint " << e;
+      if (owned == 0) {
+        EXPECT_EQ(field[e], 0) << "constraint " << e;
+      }
     }
   }
 }
@@ -90,7 +92,7 @@ TEST(Muscles, StretchAlongTheBoneAndSqueezeAcross) {
 std::vector<int> mirrored_constraints(const physics::Body& body) {
   const auto mirrored_node = [&](int i) {
     Eigen::Vector3d place = body.rest.col(i);
-    place.z() = 0.3 - place.z();
+    place.z() = 0.4 - place.z();
     for (int j = 0; j < body.node_count(); ++j) {
       if ((body.rest.col(j) - place).norm() < 1e-9) return j;
     }

@@ -79,8 +79,12 @@ TEST(ContactGenerators, StayInsideTheConeAndOpposeTheSliding) {
     ++seen[static_cast<std::size_t>(g.point)];
     EXPECT_EQ(g.force.y(), 1);
     const bool slides = creature.patch_bone[static_cast<std::size_t>(g.point)] == 3;
-    if (slides) EXPECT_LT((g.force - Eigen::Vector3d(-0.7 * 0.6, 1, 0.7 * 0.8)).norm(), 1e-15);
-    if (!slides) EXPECT_NEAR(std::hypot(g.force.x(), g.force.z()), 0.63, 1e-15);
+    if (slides) {
+      EXPECT_LT((g.force - Eigen::Vector3d(-0.7 * 0.6, 1, 0.7 * 0.8)).norm(), 1e-15);
+    }
+    if (!slides) {
+      EXPECT_NEAR(std::hypot(g.force.x(), g.force.z()), 0.63, 1e-15);
+    }
   }
   for (std::size_t p = 0; p < seen.size(); ++p) {
     const int bone = creature.patch_bone[p];
@@ -147,29 +151,58 @@ TEST(Prepare, BalancesWhatFeetCanBear) {
 
 TEST(Prepare, FliesAsGravityWantsIt) {
   const BoxCreature creature = make_box_creature();
-  const PreparedTarget target = prepared(creature, hopping(creature));
+  PrepareOptions options;
+  options.rounds = 8;
+  const PreparedTarget target = prepared(creature, hopping(creature), options);
   const Eigen::MatrixXd acceleration = com_acceleration(creature.scene.body, target.target);
+  const auto touches = [&](Eigen::Index f) { return target.contacts.touching.col((f + 36) % 36).any(); };
   int flying = 0;
   for (Eigen::Index f = 0; f < 36; ++f) {
-    if (target.contacts.touching.col(f).any()) continue;
+    if (touches(f)) continue;
     ++flying;
-    EXPECT_LT((acceleration.col(f) - creature.scene.gravity).norm(), 0.01 * 9.81) << "frame " << f;
+    // The frames next to a contact share in its push, for a frame is as fine as the plan is.
+    const bool next_to_contact = touches(f - 1) || touches(f + 1);
+    EXPECT_LT((acceleration.col(f) - creature.scene.gravity).norm(), (next_to_contact ? 0.05 : 0.01) * 9.81) << "frame " << f;
   }
   EXPECT_GT(flying, 8);
   EXPECT_NEAR(target.report.flight_s, flying / 60.0, 1e-12);
-  EXPECT_LT(target.report.missing_wrench_max_mg, 0.01);
 }
 
-TEST(Prepare, TellsWhatABodyInTheAirLacks) {
-  // It hangs half a metre above its own lowest frames for most of the time.
+TEST(Prepare, EveryRoundComesNearerToBalance) {
+  const BoxCreature creature = make_box_creature();
+  double last = 1e300;
+  for (const int rounds : {0, 1, 2, 4, 8}) {
+    PrepareOptions options;
+    options.rounds = rounds;
+    const double missing = prepared(creature, hopping(creature), options).report.missing_wrench_rms_mg;
+    EXPECT_LT(missing, 0.6 * last) << rounds << " rounds";
+    last = missing;
+  }
+  EXPECT_LT(last, 0.01);
+}
+
+TEST(Prepare, TellsTheForceThatIsMissingInTheAir) {
+  // A hover of most of a second that no jump is: what the plan cannot make of it is told frame by frame, and nothing is told that is not so.
   const BoxCreature creature = make_box_creature();
   const Motion motion = played(creature, 72, true, [](const Eigen::Vector3d& x, Eigen::Index f) {
     const double share = std::clamp(static_cast<double>(f - 20) / 10, 0.0, 1.0) - std::clamp(static_cast<double>(f - 60) / 10, 0.0, 1.0);
     return Eigen::Vector3d(x + Eigen::Vector3d(0, 0.5 * share, 0));
   });
-  const PreparedTarget target = prepared(creature, motion);
-  EXPECT_GT(target.report.missing_wrench_max_mg, 0.3);
-  EXPECT_GT(target.missing_wrench.col(45)(1), 0.1);  // upward: a force that nothing gives
+  for (const bool momentum : {false, true}) {
+    PrepareOptions options;
+    options.momentum = momentum;
+    const PreparedTarget target = prepared(creature, motion, options);
+    const Eigen::MatrixXd acceleration = com_acceleration(creature.scene.body, target.target);
+    double largest = 0;
+    for (Eigen::Index f = 0; f < 72; ++f) {
+      largest = std::max(largest, target.missing_wrench.col(f).head<3>().norm());
+      if (target.contacts.touching.col(f).any()) continue;
+      const Eigen::Vector3d missing = (acceleration.col(f) - creature.scene.gravity) / 9.81;
+      EXPECT_LT((target.missing_wrench.col(f).head<3>() - missing).norm(), 1e-6) << "frame " << f;
+    }
+    EXPECT_DOUBLE_EQ(target.report.missing_wrench_max_mg, largest);
+    EXPECT_GT(largest, 0.3);
+  }
 }
 
 TEST(Prepare, TellsWhatABodyThatLeansOutsideItsFeetLacks) {

@@ -52,12 +52,18 @@ Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tole
   const double rms = std::sqrt(squared / total);
   if (defect_out != nullptr) *defect_out = rms;
   if (rms > tolerance) return frames;
-  // Half of the defect at either end, fading to nothing in the middle with flat slopes at the seam.
+  // Half of the defect at either end, fading to nothing in the middle with flat slopes at the seam; the first half period sees it
+  // before the turn.
   loop.frames.conservativeResize(Eigen::NoChange, last);
   for (Eigen::Index f = 0; f < last; ++f) {
     const double s = static_cast<double>(f) / static_cast<double>(last);
-    const double ramp = s < 0.5 ? 0.5 * std::pow(std::cos(M_PI * s), 2) : -0.5 * std::pow(std::cos(M_PI * s), 2);
-    loop.frames.col(f) += ramp * defect;
+    const double ramp = 0.5 * std::pow(std::cos(M_PI * s), 2);
+    const Eigen::Map<const Eigen::Matrix3Xd> miss(defect.data(), 3, mass.size());
+    if (s < 0.5) {
+      loop.at(f) += ramp * turn.transpose() * miss;
+    } else {
+      loop.at(f) -= ramp * miss;
+    }
   }
   return loop;
 }

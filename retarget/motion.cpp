@@ -71,10 +71,10 @@ void MotionCurve::at(double time_s, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) co
   double s = frame - static_cast<double>(first);
   if (!motion_.loop) {
     if (first < 0) first = 0, s = 0;
-    if (first >= count - 1) first = count - 2, s = 1;
+    if (first >= count - 1) first = std::max(0L, count - 2), s = 1;
   }
   const long first_cycle = motion_.loop ? static_cast<long>(std::floor(static_cast<double>(first) / static_cast<double>(count))) : 0;
-  const long next = first + 1;
+  const long next = motion_.loop ? first + 1 : std::min(first + 1, count - 1);
   const long next_cycle = motion_.loop ? static_cast<long>(std::floor(static_cast<double>(next) / static_cast<double>(count))) : 0;
   const Eigen::Isometry3d a = after_cycles(motion_, first_cycle), b = after_cycles(motion_, next_cycle);
   const double h = 1 / motion_.rate_hz;

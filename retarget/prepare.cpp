@@ -554,6 +554,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
     Motion offset;
     offset.rate_hz = target.rate_hz;
     offset.loop = target.loop;
+    offset.yaw = target.yaw;
     offset.frames = Eigen::MatrixXd::Zero(3, frames);
     for (long f = 0; f < frames; ++f) {
       int count = 0;

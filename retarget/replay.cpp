@@ -92,8 +92,18 @@ struct Glide {
 struct Tally {
   double shape = 0, clip_shape = 0, world = 0, sole_gap = 0, slip = 0, correction = 0;
   long shapes = 0, clip_shapes = 0, soles = 0, stances = 0, corrections = 0;
-  std::vector<double> cycle, drift, heading, along, clip_along;
+  std::vector<double> cycle, drift, heading;
 };
+
+/// The velocity [m/s] that all pushes together give between two times: each counts with the share of its duration that lies there.
+Eigen::Vector3d pushed_velocity(const std::vector<Push>& pushes, double begin, double end) {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  for (const Push& push : pushes) {
+    const double seconds = std::min(end, push.time_s + push.duration_s) - std::max(begin, push.time_s);
+    if (seconds > 0) velocity += seconds / push.duration_s * push.delta_v;
+  }
+  return velocity;
+}
 
 std::string fall_cause(const ReplayInput& input, const physics::State& state, const physics::State& reference, const Fit& fit,
                        const Eigen::VectorXd& activation, double time_s) {
@@ -230,11 +240,11 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
     gravity_moment.setZero();
     physics::Termination termination = physics::Termination::kDone;
     for (int k = 0; k < options.steps_per_control && termination == physics::Termination::kDone; ++k) {
+      const double begin = time + k * options.step_s;
+      const Eigen::Vector3d pushed = pushed_velocity(options.pushes, begin, begin + options.step_s);
       const Eigen::Matrix3Xd* force = nullptr;
-      for (const Push& push : options.pushes) {
-        const double now = time + (k + 0.5) * options.step_s;
-        if (now < push.time_s || now >= push.time_s + push.duration_s) continue;
-        effect = (push.delta_v / push.duration_s) * body.mass.transpose();
+      if (!pushed.isZero(0)) {
+        effect = (pushed / options.step_s) * body.mass.transpose();
         force = &effect;
       }
       termination = stepper->step(options.step_s, activation, force, state, impulses);

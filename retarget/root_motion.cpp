@@ -11,10 +11,12 @@ RootMotionResult recover_root_motion(const Motion& points, double length, RootMo
   result.offset = Eigen::MatrixXd::Zero(3, frames);
   if (mode == RootMotion::kKeep) return result;
   if (mode == RootMotion::kNone) {
-    for (Eigen::Index f = 0; f < frames; ++f) {
-      result.offset.col(f) = -points.travel * (static_cast<double>(f) / static_cast<double>(frames));
-    }
-    result.travel = -points.travel;
+    Eigen::Vector3d travel = points.travel;
+    if (!points.loop) travel = (points.at(frames - 1) - points.at(0)).rowwise().mean();
+    travel.y() = 0;
+    const double steps = static_cast<double>(points.loop ? frames : std::max<Eigen::Index>(1, frames - 1));
+    for (Eigen::Index f = 0; f < frames; ++f) result.offset.col(f) = -travel * (static_cast<double>(f) / steps);
+    if (points.loop) result.travel = -travel;
     return result;
   }
   if (mode == RootMotion::kAuto && (!points.loop || points.travel.norm() > 0.05 * length)) return result;

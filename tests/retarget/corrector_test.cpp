@@ -1,0 +1,151 @@
+#include "retarget/corrector.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+
+#include "tests/retarget/box_creature.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kLimit = 0.3;
+
+struct Controlled {
+  BoxCreature creature = make_box_creature();
+  Muscles muscles = make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights);
+  physics::State rest{creature.scene.body.rest, Eigen::Matrix3Xd::Zero(3, creature.scene.body.node_count())};
+  std::vector<bool> standing = std::vector<bool>(static_cast<std::size_t>(creature.scene.contact_points.count()), true);
+  std::vector<bool> flying = std::vector<bool>(standing.size(), false);
+  Eigen::VectorXd passive = Eigen::VectorXd::Ones(creature.scene.body.edge_count());
+
+  Corrector corrector(const CorrectorOptions& options = {}) const {
+    return Corrector(creature.scene, muscles, BoxCreature::kLength, kLimit, options);
+  }
+
+  /// The momentum [N s] along `direction` that the body has more after `seconds` under `activation` than under the passive one.
+  double gained(const physics::State& state, const Eigen::VectorXd& activation, const Eigen::Vector3d& direction, double seconds) const {
+    double momentum[2];
+    for (int k = 0; k < 2; ++k) {
+      physics::State now = state;
+      const auto stepper = physics::make_explicit_stepper(creature.scene);
+      physics::Impulses impulses = physics::make_impulses(creature.scene);
+      for (int s = 0; s < 10; ++s) stepper->step(seconds / 10, k == 0 ? passive : activation, nullptr, now, impulses);
+      momentum[k] = direction.dot(physics::momentum(creature.scene.body, now.v));
+    }
+    return momentum[1] - momentum[0];
+  }
+};
+
+TEST(Corrector, DoesNothingOnTheNominalPath) {
+  const Controlled controlled;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    physics::State state = controlled.rest;
+    state.x += physics::random_points(random, state.x.cols(), 0.01);
+    state.v += physics::random_points(random, state.x.cols(), 1);
+    const Eigen::VectorXd given = physics::random_activation(random, controlled.creature.scene.body, 0.2);
+    Eigen::VectorXd activation = given;
+    Corrector corrector = controlled.corrector();
+    EXPECT_EQ(corrector.correct(state, state, controlled.standing, activation), 0);
+    EXPECT_EQ(activation, given);
+  }
+}
+
+TEST(Corrector, PushesBackAgainstAnErrorOfVelocity) {
+  const Controlled controlled;
+  for (const Eigen::Vector3d& direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0), Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+    SCOPED_TRACE(::testing::Message() << "error along " << direction.transpose());
+    physics::State state = controlled.rest;
+    state.v.colwise() += 0.2 * direction;
+    Corrector corrector = controlled.corrector();
+    Eigen::VectorXd activation = controlled.passive;
+    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, activation), 0);
+    EXPECT_LT(controlled.gained(state, activation, direction, 1.0 / 30), 0);
+  }
+}
+
+TEST(Corrector, PushesBackAgainstAnErrorOfPlace) {
+  const Controlled controlled;
+  for (const Eigen::Vector3d& direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, -1)}) {
+    physics::State reference = controlled.rest;
+    reference.x.colwise() -= 0.02 * direction;
+    Corrector corrector = controlled.corrector();
+    Eigen::VectorXd activation = controlled.passive;
+    corrector.correct(controlled.rest, reference, controlled.standing, activation);
+    EXPECT_LT(controlled.gained(controlled.rest, activation, direction, 1.0 / 30), 0);
+  }
+}
+
+TEST(Corrector, CannotMoveTheCentreOfMassInTheAir) {
+  // Activations are internal: in flight the momentum rows see no muscle, so an error of the whole body's velocity makes none work.
+  const Controlled controlled;
+  physics::State state = controlled.rest;
+  state.v.colwise() += Eigen::Vector3d(0.2, 0, 0);
+  Eigen::VectorXd in_flight = controlled.passive, on_feet = controlled.passive;
+  Corrector a = controlled.corrector(), b = controlled.corrector();
+  EXPECT_LT(a.correct(state, controlled.rest, controlled.flying, in_flight), 0.01 * b.correct(state, controlled.rest, controlled.standing, on_feet));
+}
+
+TEST(Corrector, KeepsToTheLimit) {
+  const Controlled controlled;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    physics::State state = controlled.rest;
+    state.v += physics::random_points(random, state.x.cols(), 20);
+    state.v.colwise() += Eigen::Vector3d(8, 0, 0);
+    Eigen::VectorXd activation = physics::random_activation(random, controlled.creature.scene.body, kLimit);
+    Corrector corrector = controlled.corrector();
+    corrector.correct(state, controlled.rest, controlled.standing, activation);
+    EXPECT_LE(activation.maxCoeff(), 1 + kLimit);
+    EXPECT_GE(activation.minCoeff(), 1 - kLimit);
+    EXPECT_GT((activation.array() - 1).abs().maxCoeff(), 0.999 * kLimit);
+  }
+}
+
+TEST(Corrector, AnswersTwiceTheErrorWithTwiceTheMuscles) {
+  const Controlled controlled;
+  physics::State once = controlled.rest, twice = controlled.rest;
+  once.v.colwise() += Eigen::Vector3d(0.05, 0, 0.02);
+  twice.v.colwise() += Eigen::Vector3d(0.1, 0, 0.04);
+  Eigen::VectorXd activation = controlled.passive;
+  Corrector a = controlled.corrector(), b = controlled.corrector();
+  a.correct(once, controlled.rest, controlled.standing, activation);
+  activation = controlled.passive;
+  b.correct(twice, controlled.rest, controlled.standing, activation);
+  EXPECT_LT((2 * a.muscles_now() - b.muscles_now()).norm(), 1e-9 * b.muscles_now().norm());
+}
+
+TEST(Corrector, LessEffortIsSpentWhereItCostsMore) {
+  const Controlled controlled;
+  physics::State state = controlled.rest;
+  state.v.colwise() += Eigen::Vector3d(0.2, 0, 0);
+  double last = 1e300;
+  for (const double effort : {0.1, 0.8, 6.0, 50.0}) {
+    CorrectorOptions options;
+    options.effort = effort;
+    Corrector corrector = controlled.corrector(options);
+    Eigen::VectorXd activation = controlled.passive;
+    const double spent = corrector.correct(state, controlled.rest, controlled.standing, activation);
+    EXPECT_LT(spent, last);
+    last = spent;
+  }
+}
+
+TEST(Corrector, ForgetsWhenReset) {
+  const Controlled controlled;
+  physics::State state = controlled.rest;
+  state.v.colwise() += Eigen::Vector3d(0.2, 0, 0);
+  Corrector corrector = controlled.corrector();
+  Eigen::VectorXd first = controlled.passive, again = controlled.passive;
+  corrector.correct(state, controlled.rest, controlled.standing, first);
+  corrector.reset();
+  corrector.correct(state, controlled.rest, controlled.standing, again);
+  EXPECT_EQ(first, again);
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

@@ -1,0 +1,188 @@
+#include "retarget/inverse_dynamics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/retarget/box_creature.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kLength = BoxCreature::kLength;
+
+Eigen::Vector3d ground_force(const InverseDynamics& inverse, Eigen::Index frame) {
+  return inverse.contact_force.col(frame).reshaped(3, inverse.contact_force.rows() / 3).rowwise().sum();
+}
+
+InverseDynamics solve_standing(const BoxCreature& creature, const Motion& motion, const InverseOptions& options = {}) {
+  return solve_inverse_dynamics(as_prepared(motion, always_standing(creature, motion.count())), creature.scene, kLength, options);
+}
+
+/// A place in the box made longer along y by `share`, of the same volume.
+Eigen::Vector3d stretched(const Eigen::Vector3d& x, double share) {
+  const double across = 1 / std::sqrt(1 + share);
+  return {across * x.x(), (1 + share) * x.y(), across * x.z()};
+}
+
+/// One frame of the free body under the solved activations and contact forces, from the target's state at frame f: how far it is from the
+/// target's next frame [m], mass-weighted RMS.
+double one_frame_error(const BoxCreature& creature, const Motion& target, const InverseDynamics& inverse, Eigen::Index f) {
+  physics::Scene scene = creature.scene;
+  scene.has_ground = false;
+  const int nodes = scene.body.node_count();
+  Eigen::Matrix3Xd contact = Eigen::Matrix3Xd::Zero(3, nodes);
+  for (int p = 0; p < scene.contact_points.count(); ++p) {
+    for (int k = 0; k < 4; ++k) {
+      contact.col(scene.contact_points.nodes(k, p)) += scene.contact_points.weights(k, p) * inverse.contact_force.col(f).segment<3>(3 * p);
+    }
+  }
+  const double ts = 1 / target.rate_hz;
+  // Under a steady acceleration the central velocity is the one at the frame.
+  physics::State state{target.at(f), Eigen::Map<const Eigen::Matrix3Xd>(velocities(target).col(f).eval().data(), 3, nodes)};
+  const auto stepper = physics::make_explicit_stepper(scene);
+  physics::Impulses impulses = physics::make_impulses(scene);
+  for (int k = 0; k < 4; ++k) stepper->step(ts / 4, inverse.activation.col(f), &contact, state, impulses);
+  const Eigen::Matrix3Xd miss = state.x - target.at(f + 1);
+  return std::sqrt(miss.colwise().squaredNorm().dot(scene.body.mass) / creature.mass());
+}
+
+TEST(InverseDynamics, HoldABodyThatStands) {
+  const BoxCreature creature = make_box_creature();
+  const InverseDynamics inverse = solve_standing(creature, standing(creature, 3));
+  const double weight = creature.mass() * 9.81;
+  EXPECT_LT(inverse.report.miss_rms_length, 3e-5);
+  EXPECT_LT(inverse.report.root_residual_mg, 0.01);
+  EXPECT_LT(inverse.report.kkt_residual, 1e-6);
+  EXPECT_EQ(inverse.report.saturated, 0);
+  for (Eigen::Index f = 0; f < 3; ++f) {
+    EXPECT_LT((ground_force(inverse, f) - Eigen::Vector3d(0, weight, 0)).norm(), 0.01 * weight);
+    for (int p = 0; p < creature.scene.contact_points.count(); ++p) {
+      const Eigen::Vector3d force = inverse.contact_force.col(f).segment<3>(3 * p);
+      EXPECT_GE(force.y(), 0);
+      EXPECT_LE(std::hypot(force.x(), force.z()), creature.scene.ground.friction * force.y() + 1e-12);
+    }
+  }
+}
+
+TEST(InverseDynamics, PushTheGroundHarderToRiseFaster) {
+  const BoxCreature creature = make_box_creature();
+  for (const double rise : {-3.0, 0.0, 4.0}) {
+    SCOPED_TRACE("acceleration " + std::to_string(rise));
+    const Motion motion = played(creature, 7, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
+      const double t = static_cast<double>(f) / 60;
+      return Eigen::Vector3d(x + Eigen::Vector3d(0, 0.5 * rise * t * t, 0));
+    });
+    const InverseDynamics inverse = solve_standing(creature, motion);
+    const double wanted = creature.mass() * (9.81 + rise);
+    EXPECT_NEAR(ground_force(inverse, 3).y(), wanted, 0.01 * wanted);
+  }
+}
+
+TEST(InverseDynamics, KeepTheirBoundsExactly) {
+  // A shape whose constraints are stretched by up to 15 % under a limit of 5 %.
+  const BoxCreature creature = make_box_creature();
+  InverseOptions options;
+  options.limit = 0.05;
+  const InverseDynamics inverse = solve_standing(creature, bobbing(creature, 8, 0.15), options);
+  EXPECT_LE((inverse.activation.array() - 1).abs().maxCoeff(), 0.05 + 1e-15);
+  EXPECT_GT(inverse.report.saturated, 0.05);
+  EXPECT_LT(inverse.report.kkt_residual, 1e-6);
+  EXPECT_EQ(inverse.report.limit, 0.05);
+}
+
+TEST(InverseDynamics, DoNotHangOnTheNumberOfThreads) {
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = bobbing(creature, 5, 0.05);
+  InverseOptions one, two;
+  one.threads = 1;
+  two.threads = 2;
+  const InverseDynamics a = solve_standing(creature, motion, one), b = solve_standing(creature, motion, two);
+  EXPECT_EQ(a.activation, b.activation);
+  EXPECT_EQ(a.contact_force, b.contact_force);
+  EXPECT_EQ(a.miss, b.miss);
+}
+
+TEST(InverseDynamics, FromTheirForcesTheFreeBodyMovesAsTheTargetDoes) {
+  const BoxCreature creature = make_box_creature();
+  // Held out of its rest shape the target is hurled up and forward, ever faster.
+  const Eigen::Vector3d acceleration(2, 3, 0);
+  const Motion motion = played(creature, 7, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
+    const double t = static_cast<double>(f) / 60;
+    return Eigen::Vector3d(stretched(x, 0.05) + 0.5 * t * t * acceleration);
+  });
+  const InverseDynamics inverse = solve_standing(creature, motion);
+  const double moved = 0.5 * acceleration.norm() / 3600;  // [m] what the acceleration makes in a frame
+  for (const Eigen::Index f : {2, 3, 4}) {
+    const double error = one_frame_error(creature, motion, inverse, f);
+    EXPECT_LT(error, std::max(10 * inverse.miss[f], 0.05 * moved)) << "frame " << f << ", predicted " << inverse.miss[f];
+  }
+}
+
+TEST(InverseDynamics, ReportTheForceThatNothingGives) {
+  // It hovers: no contact, so all of its weight is missing, and it falls by g Ts^2 in a frame.
+  const BoxCreature creature = make_box_creature();
+  ContactSchedule contacts = always_standing(creature, 3);
+  for (auto& states : contacts.state) std::fill(states.begin(), states.end(), ContactState::kOff);
+  contacts.touching.setConstant(false);
+  const InverseDynamics inverse = solve_inverse_dynamics(as_prepared(standing(creature, 3), contacts), creature.scene, kLength, {});
+  EXPECT_NEAR(inverse.report.root_residual_mg, 1, 1e-6);
+  EXPECT_NEAR(inverse.miss[1], 9.81 / 3600, 0.1 * 9.81 / 3600);
+  EXPECT_EQ(inverse.contact_force.norm(), 0);
+}
+
+TEST(InverseDynamics, TellThePenaltyForcesOfTheirActivations) {
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = bobbing(creature, 4, 0.05);
+  const InverseDynamics inverse = solve_standing(creature, motion);
+  const physics::Body& body = creature.scene.body;
+  for (Eigen::Index f = 0; f < 4; ++f) {
+    for (int e = 0; e < body.edge_count(); ++e) {
+      const double length = (motion.at(f).col(body.edges(0, e)) - motion.at(f).col(body.edges(1, e))).norm();
+      EXPECT_NEAR(inverse.penalty_force(e, f), body.edge_stiffness[e] * (length - inverse.activation(e, f) * body.rest_length[e]), 1e-8);
+    }
+  }
+}
+
+TEST(InverseDynamics, SmoothnessTakesJumpsOutOfTheActivations) {
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = bobbing(creature, 10, 0.08);
+  InverseOptions rough, smooth_options;
+  rough.smooth_weight = 0;
+  smooth_options.smooth_weight = 3;
+  const auto bend = [](const InverseDynamics& inverse) {
+    double squared = 0;
+    for (Eigen::Index f = 0; f < 10; ++f) {
+      squared += (inverse.activation.col((f + 1) % 10) - 2 * inverse.activation.col(f) + inverse.activation.col((f + 9) % 10)).squaredNorm();
+    }
+    return squared;
+  };
+  EXPECT_LT(bend(solve_standing(creature, motion, smooth_options)), bend(solve_standing(creature, motion, rough)));
+}
+
+TEST(InverseDynamics, WishForTheKinematicActivation) {
+  // The constraints are more than the nodes can tell apart: of all that balance, those nearest to the target's own lengths are
+  // taken, and what they differ in carries the weight alone.
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = played(creature, 3, true, [](const Eigen::Vector3d& x, Eigen::Index) { return stretched(x, 0.06); });
+  const Eigen::VectorXd upright = solve_standing(creature, motion).activation.col(1);
+  const physics::Body& body = creature.scene.body;
+  Eigen::VectorXd wish(body.edge_count());
+  for (int e = 0; e < body.edge_count(); ++e) {
+    wish[e] = (motion.at(1).col(body.edges(0, e)) - motion.at(1).col(body.edges(1, e))).norm() / body.rest_length[e];
+  }
+  EXPECT_GT((wish.array() - 1).matrix().norm(), 5 * (upright - wish).norm());
+}
+
+TEST(AutomaticLimit, IsThe99thPercentileWithinItsBounds) {
+  const BoxCreature creature = make_box_creature();
+  EXPECT_EQ(automatic_limit(creature.scene.body, standing(creature, 3)), 0.1);
+  EXPECT_EQ(automatic_limit(creature.scene.body, bobbing(creature, 8, 0.9)), 0.4);
+  const double between = automatic_limit(creature.scene.body, bobbing(creature, 8, 0.2));
+  EXPECT_GT(between, 0.19);  // upright constraints see all of the stretch in the highest frame
+  EXPECT_LE(between, 0.2 + 1e-12);
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

@@ -1,0 +1,248 @@
+#include "retarget/prepare.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/retarget/box_creature.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+double volume_error_rms(const physics::Body& body, const Motion& motion) {
+  double squared = 0;
+  for (Eigen::Index f = 0; f < motion.count(); ++f) {
+    squared += (physics::jacobians(body, motion.at(f)).array() - 1).square().mean() / static_cast<double>(motion.count());
+  }
+  return std::sqrt(squared);
+}
+
+/// Of the centre of mass [m/s2], 3 x F.
+Eigen::MatrixXd com_acceleration(const physics::Body& body, const Motion& motion) {
+  Motion com = motion;
+  com.frames.resize(3, motion.count());
+  for (Eigen::Index f = 0; f < motion.count(); ++f) com.frames.col(f) = physics::centre_of_mass(body, motion.at(f));
+  return accelerations(com);
+}
+
+/// A loop of 36 frames: 18 on the ground, then an arc of the whole body, drawn as an animator would and not as gravity does.
+Motion hopping(const BoxCreature& creature) {
+  return played(creature, 36, true, [](const Eigen::Vector3d& x, Eigen::Index f) {
+    const double rise = f < 18 ? 0 : 0.12 * std::pow(std::sin(M_PI * static_cast<double>(f - 18) / 18), 2);
+    const double squat = f < 18 ? 0.06 * std::pow(std::sin(M_PI * static_cast<double>(f) / 18), 2) : 0;
+    return Eigen::Vector3d(x.x(), x.y() * (1 - squat) + rise, x.z());
+  });
+}
+
+TEST(Smooth, KeepsStraightLines) {
+  for (const bool loop : {false, true}) {
+    Motion motion;
+    motion.loop = loop;
+    motion.frames.resize(6, 30);
+    const Eigen::Vector3d speed(0.3, loop ? 0 : 0.2, -0.7);
+    for (int f = 0; f < 30; ++f) {
+      motion.frames.col(f).head<3>() = Eigen::Vector3d(1, 2, 3) + f / 60.0 * speed;
+      motion.frames.col(f).tail<3>() = Eigen::Vector3d(-1, 0, 1) + f / 60.0 * speed;
+    }
+    if (loop) motion.travel = 0.5 * speed;
+    EXPECT_LT((smooth(motion, 10).frames - motion.frames).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
+TEST(Smooth, HalvesTheAmplitudeAtTheCutOff) {
+  const auto gain = [](double hz, double cutoff) {
+    Motion motion;
+    motion.loop = true;
+    motion.frames.resize(3, 60);
+    for (int f = 0; f < 60; ++f) motion.frames.col(f).setConstant(std::sin(2 * M_PI * hz * f / 60));
+    return smooth(motion, cutoff).frames.norm() / motion.frames.norm();
+  };
+  for (const double cutoff : {4.0, 6.0, 10.0, 15.0}) {
+    SCOPED_TRACE("cut-off " + std::to_string(cutoff));
+    EXPECT_NEAR(gain(cutoff, cutoff), 0.5, 1e-3);
+    EXPECT_GT(gain(std::floor(cutoff / 2), cutoff), 0.95);
+    EXPECT_LT(gain(std::min(29.0, 2 * cutoff), cutoff), 0.13);
+  }
+}
+
+TEST(ContactGenerators, StayInsideTheConeAndOpposeTheSliding) {
+  const BoxCreature creature = make_box_creature();
+  ContactSchedule contacts = always_standing(creature, 3);
+  contacts.state[1][1] = ContactState::kOff;
+  contacts.state[2][1] = ContactState::kSlide;
+  contacts.sliding_x(2, 1) = 0.6;
+  contacts.sliding_z(2, 1) = -0.8;
+  contacts.touching(0, 1) = false;
+  std::vector<int> seen(static_cast<std::size_t>(creature.scene.contact_points.count()), 0);
+  for (const ContactGenerator& g : contact_generators(contacts, 1, 0.7, 0.9)) {
+    ++seen[static_cast<std::size_t>(g.point)];
+    EXPECT_EQ(g.force.y(), 1);
+    const bool slides = creature.patch_bone[static_cast<std::size_t>(g.point)] == 3;
+    if (slides) {
+      EXPECT_LT((g.force - Eigen::Vector3d(-0.7 * 0.6, 1, 0.7 * 0.8)).norm(), 1e-15);
+    }
+    if (!slides) {
+      EXPECT_NEAR(std::hypot(g.force.x(), g.force.z()), 0.63, 1e-15);
+    }
+  }
+  for (std::size_t p = 0; p < seen.size(); ++p) {
+    const int bone = creature.patch_bone[p];
+    EXPECT_EQ(seen[p], p == 0 || bone == 2 ? 0 : bone == 3 ? 1 : 4) << "point " << p;
+  }
+}
+
+TEST(Prepare, LeavesABodyThatStandsAlone) {
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = standing(creature, 12);
+  const PreparedTarget target = prepared(creature, motion);
+  EXPECT_LT((target.target.frames - motion.frames).cwiseAbs().maxCoeff(), 1e-5 * BoxCreature::kLength);
+  EXPECT_LT(target.report.missing_wrench_max_mg, 1e-3);
+  EXPECT_EQ(target.report.flight_s, 0);
+  EXPECT_EQ(target.contacts.patches.size(), 4u);
+}
+
+TEST(Prepare, BringsTheVolumeBack) {
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = bobbing(creature, 30, 0.06);
+  const PreparedTarget target = prepared(creature, motion);
+  const double before = volume_error_rms(creature.scene.body, motion), after = volume_error_rms(creature.scene.body, target.target);
+  EXPECT_GT(before, 0.03);
+  EXPECT_LT(after, before / 5);
+  EXPECT_NEAR(after, target.report.volume_error_rms, 1e-12);
+  EXPECT_GT(target.report.min_jacobian, 0.8);
+  PrepareOptions ablation;
+  ablation.volume = false;
+  EXPECT_GT(volume_error_rms(creature.scene.body, prepared(creature, motion, ablation).target), before / 3);
+}
+
+TEST(Prepare, LaysTheSolesOnTheGround) {
+  const BoxCreature creature = make_box_creature();
+  // Feet that sink, float and creep by a few millimetres while they stand.
+  const Motion motion = played(creature, 30, true, [](const Eigen::Vector3d& x, Eigen::Index f) {
+    const double phase = 2 * M_PI * static_cast<double>(f) / 30;
+    return Eigen::Vector3d(x + Eigen::Vector3d(0.004 * std::sin(phase + 9 * x.x()), 0.003 * std::sin(phase + 7 * x.x()), 0));
+  });
+  const PreparedTarget target = prepared(creature, motion);
+  const Motion points = point_motion(creature.scene.contact_points, target.target);
+  ASSERT_EQ(target.contacts.patches.size(), 4u);
+  double highest = 0, furthest = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    for (const int p : target.contacts.patches[k].points) {
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (Eigen::Index f = 0; f < 30; ++f) mean += points.at(f).col(p) / 30;
+      for (Eigen::Index f = 0; f < 30; ++f) {
+        ASSERT_EQ(target.contacts.state[k][static_cast<std::size_t>(f)], ContactState::kStick);
+        highest = std::max(highest, std::abs(points.at(f)(1, p)));
+        furthest = std::max(furthest, (points.at(f).col(p) - mean).norm());
+      }
+    }
+  }
+  EXPECT_LT(highest, 1e-4 * BoxCreature::kLength);
+  EXPECT_LT(furthest, 1e-4 * BoxCreature::kLength);
+}
+
+TEST(Prepare, BalancesWhatFeetCanBear) {
+  const BoxCreature creature = make_box_creature();
+  const PreparedTarget target = prepared(creature, bobbing(creature, 30, 0.06));
+  EXPECT_LT(target.report.missing_wrench_max_mg, 0.01);
+  EXPECT_LT(target.missing_wrench.cwiseAbs().maxCoeff(), 0.01);
+}
+
+TEST(Prepare, FliesAsGravityWantsIt) {
+  const BoxCreature creature = make_box_creature();
+  PrepareOptions options;
+  options.rounds = 8;
+  const PreparedTarget target = prepared(creature, hopping(creature), options);
+  const Eigen::MatrixXd acceleration = com_acceleration(creature.scene.body, target.target);
+  const auto touches = [&](Eigen::Index f) { return target.contacts.touching.col((f + 36) % 36).any(); };
+  int flying = 0;
+  for (Eigen::Index f = 0; f < 36; ++f) {
+    if (touches(f)) continue;
+    ++flying;
+    // The frames next to a contact share in its push, for a frame is as fine as the plan is.
+    const bool next_to_contact = touches(f - 1) || touches(f + 1);
+    EXPECT_LT((acceleration.col(f) - creature.scene.gravity).norm(), (next_to_contact ? 0.05 : 0.01) * 9.81) << "frame " << f;
+  }
+  EXPECT_GT(flying, 8);
+  EXPECT_NEAR(target.report.flight_s, flying / 60.0, 1e-12);
+}
+
+TEST(Prepare, EveryRoundComesNearerToBalance) {
+  const BoxCreature creature = make_box_creature();
+  double last = 1e300;
+  for (const int rounds : {0, 1, 2, 4, 8}) {
+    PrepareOptions options;
+    options.rounds = rounds;
+    const double missing = prepared(creature, hopping(creature), options).report.missing_wrench_rms_mg;
+    EXPECT_LT(missing, 0.6 * last) << rounds << " rounds";
+    last = missing;
+  }
+  EXPECT_LT(last, 0.01);
+}
+
+TEST(Prepare, TellsTheForceThatIsMissingInTheAir) {
+  // A hover of most of a second that no jump is: what the plan cannot make of it is told frame by frame, and nothing is told that is not so.
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = played(creature, 72, true, [](const Eigen::Vector3d& x, Eigen::Index f) {
+    const double share = std::clamp(static_cast<double>(f - 20) / 10, 0.0, 1.0) - std::clamp(static_cast<double>(f - 60) / 10, 0.0, 1.0);
+    return Eigen::Vector3d(x + Eigen::Vector3d(0, 0.5 * share, 0));
+  });
+  for (const bool momentum : {false, true}) {
+    PrepareOptions options;
+    options.momentum = momentum;
+    const PreparedTarget target = prepared(creature, motion, options);
+    const Eigen::MatrixXd acceleration = com_acceleration(creature.scene.body, target.target);
+    double largest = 0;
+    for (Eigen::Index f = 0; f < 72; ++f) {
+      largest = std::max(largest, target.missing_wrench.col(f).head<3>().norm());
+      if (target.contacts.touching.col(f).any()) continue;
+      const Eigen::Vector3d missing = (acceleration.col(f) - creature.scene.gravity) / 9.81;
+      EXPECT_LT((target.missing_wrench.col(f).head<3>() - missing).norm(), 1e-6) << "frame " << f;
+    }
+    EXPECT_DOUBLE_EQ(target.report.missing_wrench_max_mg, largest);
+    EXPECT_GT(largest, 0.3);
+  }
+}
+
+TEST(Prepare, TellsWhatABodyThatLeansOutsideItsFeetLacks) {
+  // It stands on its front feet alone, a quarter of a metre before its centre of mass, and the back feet are held up.
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = played(creature, 24, true, [](const Eigen::Vector3d& x, Eigen::Index) {
+    return Eigen::Vector3d(x + Eigen::Vector3d(0, x.x() < 0.15 && x.y() < 0.05 ? 0.05 : 0, 0));
+  });
+  PrepareOptions options;
+  options.momentum = false;
+  const PreparedTarget target = prepared(creature, motion, options);
+  ASSERT_EQ(target.contacts.patches.size(), 2u);
+  EXPECT_GT(target.missing_wrench.bottomRows<3>().cwiseAbs().maxCoeff() + target.report.missing_wrench_max_mg, 0.1);
+}
+
+TEST(Prepare, ABodyThatNeverTouchesLacksItsWholeWeight) {
+  const BoxCreature creature = make_box_creature();
+  Motion motion = standing(creature, 12);
+  PreparedTarget target = prepared(creature, motion);
+  // Every contact forbidden: nothing bears it.
+  PrepareOptions options;
+  options.contacts.height = -1;
+  options.momentum = false;
+  target = prepared(creature, motion, options);
+  EXPECT_TRUE(target.contacts.patches.empty());
+  EXPECT_NEAR(target.report.missing_wrench_max_mg, 1, 1e-6);
+  EXPECT_NEAR(target.report.missing_wrench_rms_mg, 1, 1e-6);
+}
+
+TEST(Prepare, OfALoopThatTravelsTravelsOn) {
+  const BoxCreature creature = make_box_creature();
+  Motion motion = bobbing(creature, 24, 0.03);
+  motion.travel << 0.1, 0, -0.05;  // a body that slides along on its soles
+  for (Eigen::Index f = 0; f < 24; ++f) motion.at(f).colwise() += static_cast<double>(f) / 24 * motion.travel;
+  const PreparedTarget target = prepared(creature, motion);
+  EXPECT_TRUE(target.target.loop);
+  EXPECT_EQ(target.target.travel, motion.travel);
+  const Eigen::MatrixXd bend = accelerations(target.target);
+  EXPECT_LT(bend.col(0).cwiseAbs().maxCoeff(), 2 * bend.middleCols(5, 14).cwiseAbs().maxCoeff() + 0.1);
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

@@ -1,0 +1,106 @@
+#include "retarget/root_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr Eigen::Index kFrames = 48;
+constexpr double kPeriod = kFrames / 60.0;  // [s]
+
+/// Four feet below a trunk, diagonals together, each 60 % of the period on the ground. The feet of a body that goes along `travel`
+/// [m] a period stand still in the world; on a treadmill (`share` 0) they run backward under it.
+Motion walk(const Eigen::Vector3d& travel, double share) {
+  Motion motion;
+  motion.loop = true;
+  motion.travel = share * travel;
+  motion.frames.resize(15, kFrames);
+  const double duty = 0.6;
+  for (Eigen::Index f = 0; f < kFrames; ++f) {
+    const double phase = static_cast<double>(f) / static_cast<double>(kFrames);
+    const Eigen::Vector3d gone = share * phase * travel;
+    for (int foot = 0; foot < 4; ++foot) {
+      double own = phase + (foot % 3 == 0 ? 0 : 0.5);
+      own -= std::floor(own);
+      // Along the travel, seen from the trunk: from +duty/2 back to -duty/2 in stance, forth in swing.
+      const double swing = (own - duty) / (1 - duty);
+      const double along = own < duty ? duty / 2 - own : -duty / 2 + duty * (0.5 - 0.5 * std::cos(M_PI * swing));
+      const double height = own < duty ? 0 : 0.1 * std::sin(M_PI * swing);
+      motion.at(f).col(foot) = gone + Eigen::Vector3d(foot < 2 ? 0.4 : -0.4, height, foot % 2 == 0 ? 0.2 : -0.2) + along * travel;
+    }
+    motion.at(f).col(4) = gone + Eigen::Vector3d(0, 0.5, 0);
+  }
+  return motion;
+}
+
+TEST(RecoverRootMotion, FindsTheSpeedOfATreadmill) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    const double heading = 2 * M_PI * uniform(random), stride = 0.2 + 0.6 * uniform(random);
+    const Eigen::Vector3d travel(stride * std::cos(heading), 0, stride * std::sin(heading));
+    const RootMotionResult result = recover_root_motion(walk(travel, 0), 1, RootMotion::kAuto);
+    ASSERT_TRUE(result.recovered);
+    EXPECT_LT((result.travel - travel).norm(), 0.04 * stride);
+    // The pace is even, and every course starts where it stands.
+    EXPECT_EQ(result.offset.col(0).norm(), 0);
+    for (Eigen::Index f = 0; f < kFrames; ++f) {
+      EXPECT_LT((result.offset.col(f) - result.travel * (static_cast<double>(f) / kFrames)).norm(), 0.05 * stride);
+      EXPECT_EQ(result.offset(1, f), 0);
+    }
+  }
+}
+
+TEST(RecoverRootMotion, LeavesATravellingClipAlone) {
+  for (const RootMotion mode : {RootMotion::kAuto, RootMotion::kKeep}) {
+    const RootMotionResult result = recover_root_motion(walk({0.5, 0, 0.2}, 1), 1, mode);
+    EXPECT_FALSE(result.recovered);
+    EXPECT_EQ(result.offset.norm(), 0);
+    EXPECT_EQ(result.travel.norm(), 0);
+  }
+}
+
+TEST(RecoverRootMotion, LeavesAnIdleClipAlone) {
+  const RootMotionResult result = recover_root_motion(walk({0.01, 0, 0}, 0), 1, RootMotion::kAuto);
+  EXPECT_FALSE(result.recovered);
+  EXPECT_EQ(result.offset.norm(), 0);
+}
+
+TEST(RecoverRootMotion, FromFeetAddsNextToNothingToATravellingClip) {
+  const RootMotionResult result = recover_root_motion(walk({0.5, 0, 0}, 1), 1, RootMotion::kFromFeet);
+  EXPECT_TRUE(result.recovered);
+  EXPECT_LT(result.travel.norm(), 0.02);
+}
+
+TEST(RecoverRootMotion, KeepNeverMovesATreadmill) {
+  EXPECT_FALSE(recover_root_motion(walk({0.5, 0, 0}, 0), 1, RootMotion::kKeep).recovered);
+}
+
+TEST(RecoverRootMotion, NoneTakesTheTravelOfALoopAway) {
+  const Motion motion = walk({0.5, 0, -0.2}, 1);
+  const RootMotionResult result = recover_root_motion(motion, 1, RootMotion::kNone);
+  EXPECT_LT((motion.travel + result.travel).norm(), 1e-15);
+  for (Eigen::Index f = 0; f < kFrames; ++f) {  // the trunk stands
+    EXPECT_LT((motion.at(f).col(4) + result.offset.col(f) - motion.at(0).col(4)).norm(), 1e-12);
+  }
+}
+
+TEST(RecoverRootMotion, NoneTakesTheTravelOfAOneShotAway) {
+  Motion motion = walk({0.5, 0, -0.2}, 1);
+  motion.loop = false;
+  motion.travel.setZero();
+  const RootMotionResult result = recover_root_motion(motion, 1, RootMotion::kNone);
+  EXPECT_EQ(result.travel.norm(), 0);
+  const Eigen::Index last = kFrames - 1;
+  const Eigen::Vector3d gone = (motion.at(last).rowwise().mean() + result.offset.col(last)) - motion.at(0).rowwise().mean();
+  EXPECT_LT(std::hypot(gone.x(), gone.z()), 1e-12);
+  EXPECT_EQ(result.offset.row(1).norm(), 0);
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

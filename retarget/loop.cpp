@@ -4,6 +4,17 @@
 
 namespace hydrostat::retarget {
 
+Eigen::Matrix3Xd closure_defect(const Motion& loop, const Eigen::Ref<const Eigen::Matrix3Xd>& start,
+                                const Eigen::Ref<const Eigen::Matrix3Xd>& end) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(loop.yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  return end - ((turn * start).colwise() + loop.travel);
+}
+
+double closure_ramp(double share) {
+  const double size = 0.5 * std::pow(std::cos(M_PI * share), 2);
+  return share < 0.5 ? size : -size;
+}
+
 Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tolerance, double* defect_out) {
   const Eigen::Index last = frames.count() - 1;
   if (last < 4) return frames;
@@ -25,22 +36,13 @@ Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tole
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
   loop.travel = last_com - turn * first_com;
   loop.travel.y() = 0;
-  Eigen::VectorXd defect(frames.frames.rows());
-  double squared = 0;
-  for (Eigen::Index i = 0; i < mass.size(); ++i) {
-    const Eigen::Vector3d miss = last_shape.col(i) - (turn * first_shape.col(i) + loop.travel);
-    defect.segment<3>(3 * i) = miss;
-    squared += mass[i] * miss.squaredNorm();
-  }
-  const double rms = std::sqrt(squared / total);
+  const Eigen::Matrix3Xd defect = closure_defect(loop, first_shape, last_shape);
+  const double rms = std::sqrt((defect.colwise().squaredNorm() * mass)(0) / total);
   if (defect_out != nullptr) *defect_out = rms;
   if (rms > tolerance) return frames;
-  // Half of the defect at either end, fading to nothing in the middle with flat slopes at the seam.
   loop.frames.conservativeResize(Eigen::NoChange, last);
   for (Eigen::Index f = 0; f < last; ++f) {
-    const double s = static_cast<double>(f) / static_cast<double>(last);
-    const double ramp = s < 0.5 ? 0.5 * std::pow(std::cos(M_PI * s), 2) : -0.5 * std::pow(std::cos(M_PI * s), 2);
-    loop.frames.col(f) += ramp * defect;
+    loop.at(f) += closure_ramp(static_cast<double>(f) / static_cast<double>(last)) * defect;
   }
   return loop;
 }

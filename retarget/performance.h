@@ -1,0 +1,57 @@
+#pragma once
+
+#include <optional>
+
+#include "retarget/control_mesh.h"
+#include "retarget/replay.h"
+#include "retarget/signal_set.h"
+
+namespace hydrostat::retarget {
+
+/// A creature as its replays need it: no clip and no bones are left.
+struct Performer {
+  SkinnedMesh skin;        // bind pose and triangles; the weights are empty
+  Embedding embedding;     // of the skin's vertices in `mesh`
+  ControlMesh mesh;        // nodes, tets and edges
+  ContactPoints contacts;
+  physics::Scene scene;
+  Muscles muscles;
+  PreparedTarget prepared;
+  Motion clip_points;      // the contact points as the clip has them, 3P x F
+  Motion clip_skin;        // all of the skin likewise, thinned for the eye, 3V x F
+  double length = 1, size = 1;  // L and D [m]
+};
+
+struct PerformOptions {
+  ReplayOptions replay;    // `correct` and `trace` are of the closed loop
+  unsigned seed = 0;       // 0: the body as it was planned; else see varied_scene
+  bool closed_loop = true;
+  int threads = 2;         // two let the baselines run beside the closed loop; the outcome does not hang on it
+};
+
+/// The free runs of one body: naive (the target's lengths as rest lengths), open loop (the signals alone), closed loop.
+struct Performances {
+  Replay naive, open_loop;
+  std::optional<Replay> closed_loop;
+};
+
+/// How a body differs from its plan: factors on mass, friction and stiffness (with the dashpots).
+struct Variation {
+  double mass = 1, friction = 1, stiffness = 1;
+};
+
+/// Factors drawn evenly within 2 % of 1 by the seed; seed 0 is exactly 1.
+Variation variation_of(unsigned seed);
+
+/// The scene with another body of the same shape.
+physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation);
+
+/// Lets the creature go three times, on the same body, contact and solver. The signals play from their coefficients with all
+/// layers.
+Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
+
+/// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's
+/// substep is halved.
+double substep_error(const Performer& performer, const SignalSet& signals, const ReplayOptions& options);
+
+}  // namespace hydrostat::retarget

@@ -1,16 +1,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
-#include <optional>
 #include <thread>
 
 #include "cli/number_option.h"
 #include "cli/outcome.h"
-#include "cli/progress.h"
+#include "cli/stages.h"
 #include "cli/subcommands.h"
 #include "io/body_file.h"
 #include "io/creature_record.h"
@@ -47,46 +45,6 @@ const std::map<std::string, retarget::RootMotion> kRootMotions{{"auto", retarget
 const std::map<std::string, physics::Method> kMethods{{"auto", retarget::CreatureOptions().method},
                                                       {"explicit", physics::Method::kExplicit},
                                                       {"euler", physics::Method::kEuler}};
-
-/// Runs stages one after the other, or takes their results from the cache, and keeps the time.
-class Stages {
- public:
-  explicit Stages(Progress& progress) : progress_(progress) {}
-
-  std::vector<std::pair<std::string, double>> timing_s;
-
-  void use_cache(const fs::path& directory) { cache_.emplace(directory); }
-
-  template <typename Make>
-  auto run(const std::string& name, const Make& make) {
-    progress_.begin(name);
-    const auto began = std::chrono::steady_clock::now();
-    auto result = make();
-    progress_.end(outcome_);
-    outcome_.clear();
-    timing_s.emplace_back(name, std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
-    return result;
-  }
-  /// The result is looked for in the cache under `key` and kept there.
-  template <typename Make>
-  auto run(const std::string& name, const std::string& key, const Make& make) {
-    using Result = decltype(make());
-    return run(name, [&]() -> Result {
-      if (const std::optional<io::Record> record = cache_->load(name, key)) {
-        outcome_ = "from the cache";
-        return io::result_of<Result>(*record);
-      }
-      Result result = make();
-      cache_->store(name, key, io::record_of(result));
-      return result;
-    });
-  }
-
- private:
-  Progress& progress_;
-  std::optional<io::StageCache> cache_;
-  std::string outcome_;
-};
 
 /// The key of a stage: all that the stage before depends on, and what this one adds.
 template <typename... Values>
@@ -309,7 +267,9 @@ int convert(const ConvertOptions& options) {
   report.timing_s = stages.timing_s;
   write_outcome(writer, target.performer, signals, performances, report);
   writer.commit();
-  return tell_outcome(options.out, performances, report, options.json);
+  const retarget::Replay& run = performances.main();
+  const std::string motion_file = (fs::path(options.out) / "failed.glb").string();
+  return options.json ? tell_report(run, options.out, motion_file, report) : tell_run(run, options.out, motion_file);
 }
 
 }  // namespace

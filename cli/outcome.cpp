@@ -11,25 +11,20 @@
 
 namespace hydrostat::cli {
 
-const retarget::Replay& main_run(const retarget::Performances& performances) {
-  return performances.closed_loop ? *performances.closed_loop : performances.open_loop;
-}
-
 bool is_down(const retarget::Replay& replay) {
   return replay.report.fell || replay.termination == physics::Termination::kDiverged;
 }
 
 void report_replays(const retarget::Performances& performances, retarget::RunReport& report) {
-  report.naive = performances.naive.report;
-  report.open_loop = performances.open_loop.report;
-  report.closed_loop.reset();
+  if (performances.naive) report.naive = performances.naive->report;
+  if (performances.open_loop) report.open_loop = performances.open_loop->report;
   if (performances.closed_loop) report.closed_loop = performances.closed_loop->report;
-  report.outcome_ok = !is_down(main_run(performances));
+  report.outcome_ok = !is_down(performances.main());
 }
 
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
                    const retarget::Performances& performances, const retarget::RunReport& report) {
-  const retarget::Replay& run = main_run(performances);
+  const retarget::Replay& run = performances.main();
   const bool down = is_down(run);
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
                         {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
@@ -63,6 +58,9 @@ void measure(const retarget::Performer& performer, const retarget::SignalSet& si
   report.warnings.emplace_back(text);
 }
 
+namespace {
+
+/// How long the creature stays up, and how near to target and clip.
 std::string summary(const retarget::ReplayReport& report, const std::string& where) {
   char text[300];
   std::snprintf(text, sizeof text,
@@ -74,21 +72,28 @@ std::string summary(const retarget::ReplayReport& report, const std::string& whe
   return where + text;
 }
 
-std::string failure(const retarget::Replay& replay, const std::string& where, const std::string& motion_file) {
-  const bool diverged = replay.termination == physics::Termination::kDiverged;
-  return one_line({where, "replay", diverged ? replay.report.fall_cause : "the creature fell: " + replay.report.fall_cause,
-                   "The report tells more, and " + motion_file + " shows it; try a higher --limit, more --nodes or a calmer clip"});
+std::string failure(const retarget::Replay& run, const std::string& where, const std::string& motion_file) {
+  const bool diverged = run.termination == physics::Termination::kDiverged;
+  return one_line({where, "replay", diverged ? run.report.fall_cause : "the creature fell: " + run.report.fall_cause,
+                   motion_file + " shows it; try a higher --limit, more --nodes or a calmer clip"});
 }
 
-int tell_outcome(const std::string& where, const retarget::Performances& performances, const retarget::RunReport& report, bool json) {
-  const retarget::Replay& run = main_run(performances);
-  if (json) std::cout << io::report_json(report);
+}  // namespace
+
+int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file) {
   if (is_down(run)) {
-    std::cerr << failure(run, where, "failed.glb") << std::endl;
+    std::cerr << failure(run, where, motion_file) << std::endl;
     return kShortOfTarget;
   }
-  if (!json) std::cout << summary(run.report, where) << "\n";
+  std::cout << summary(run.report, where) << "\n";
   return kDone;
+}
+
+int tell_report(const retarget::Replay& run, const std::string& where, const std::string& motion_file,
+                const retarget::RunReport& report) {
+  std::cout << io::report_json(report);
+  if (is_down(run)) std::cerr << failure(run, where, motion_file) << std::endl;
+  return is_down(run) ? kShortOfTarget : kDone;
 }
 
 }  // namespace hydrostat::cli

@@ -7,9 +7,6 @@
 
 namespace hydrostat::cli {
 
-/// The run that the user asked for: the closed loop where there is one, else the open loop.
-const retarget::Replay& main_run(const retarget::Performances& performances);
-
 /// Whether the run fell or diverged.
 bool is_down(const retarget::Replay& replay);
 
@@ -27,13 +24,10 @@ retarget::SignalsReport signals_report(const retarget::SignalSet& signals);
 void measure(const retarget::Performer& performer, const retarget::SignalSet& signals, const retarget::PerformOptions& options,
              retarget::RunReport& report);
 
-/// One line: how long the creature stays up, and how near to target and clip.
-std::string summary(const retarget::ReplayReport& report, const std::string& where);
-
-/// One line: what went wrong with a run that is down.
-std::string failure(const retarget::Replay& replay, const std::string& where, const std::string& motion_file);
-
-/// Last words of a command: the report or the summary on standard output, a failure on standard error. Returns the exit code.
-int tell_outcome(const std::string& where, const retarget::Performances& performances, const retarget::RunReport& report, bool json);
+/// Last words of a command. Standard output gets one line of figures, or the report as JSON; standard error, where the run is down,
+/// one line with the cause. Returns the exit code.
+int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file);
+int tell_report(const retarget::Replay& run, const std::string& where, const std::string& motion_file,
+                const retarget::RunReport& report);
 
 }  // namespace hydrostat::cli

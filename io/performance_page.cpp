@@ -19,8 +19,8 @@ struct Run {
 std::vector<Run> runs_of(const retarget::Performances& performances) {
   std::vector<Run> runs;
   if (performances.closed_loop) runs.push_back({"replay", PageRole::kReplay, *performances.closed_loop});
-  runs.push_back({"open loop", PageRole::kOpenLoop, performances.open_loop});
-  runs.push_back({"naive", PageRole::kNaive, performances.naive});
+  if (performances.open_loop) runs.push_back({"open loop", PageRole::kOpenLoop, *performances.open_loop});
+  if (performances.naive) runs.push_back({"naive", PageRole::kNaive, *performances.naive});
   return runs;
 }
 

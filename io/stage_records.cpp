@@ -367,12 +367,15 @@ void visit(Archive& archive, const std::string& at, retarget::Replay& replay) {
 
 template <typename Archive>
 void visit(Archive& archive, const std::string& at, retarget::Performances& performances) {
-  visit(archive, at + "naive/", performances.naive);
-  visit(archive, at + "open_loop/", performances.open_loop);
-  bool is_closed = performances.closed_loop.has_value();
-  archive(at + "is_closed", is_closed);
-  if (is_closed && !performances.closed_loop) performances.closed_loop.emplace();
-  if (is_closed) visit(archive, at + "closed_loop/", *performances.closed_loop);
+  for (const auto& [name, run] : {std::pair{"naive", &performances.naive},
+                                  std::pair{"open_loop", &performances.open_loop},
+                                  std::pair{"closed_loop", &performances.closed_loop}}) {
+    bool is_there = run->has_value();
+    archive(at + name, is_there);
+    if (!is_there) continue;
+    if (!*run) run->emplace();
+    visit(archive, at + name + "/", **run);
+  }
 }
 
 template <typename Archive>

@@ -71,19 +71,14 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
   baseline.correct = baseline.trace = false;
   Performances result;
   const auto run_baselines = [&] {
+    if (!options.baselines) return;
     result.naive = run(performer, plant, target_lengths(performer, signals.limit), signals.limit, baseline);
     if (options.closed_loop) result.open_loop = run(performer, plant, signals_of(signals), signals.limit, baseline);
   };
   auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, run_baselines);
-  if (options.closed_loop) {
-    ReplayOptions closed = options.replay;
-    closed.correct = true;
-    result.closed_loop = run(performer, plant, signals_of(signals), signals.limit, closed);
-  } else {
-    ReplayOptions open = options.replay;
-    open.correct = false;
-    result.open_loop = run(performer, plant, signals_of(signals), signals.limit, open);
-  }
+  ReplayOptions main = options.replay;
+  main.correct = options.closed_loop;
+  (options.closed_loop ? result.closed_loop : result.open_loop) = run(performer, plant, signals_of(signals), signals.limit, main);
   beside.get();
   return result;
 }

@@ -22,17 +22,22 @@ struct Performer {
   double length = 1, size = 1;  // L and D [m]
 };
 
+/// Which free runs are wanted, and how.
 struct PerformOptions {
-  ReplayOptions replay;    // `correct` and `trace` are of the closed loop
+  ReplayOptions replay;    // `correct` is the run's own; the trace is of the closed loop, or of the open loop where that is the main run
   unsigned seed = 0;       // 0: the body as it was planned; else see varied_scene
-  bool closed_loop = true;
-  int threads = 2;         // two let the baselines run beside the closed loop; the outcome does not hang on it
+  bool closed_loop = true; // false: the open loop is the main run
+  bool baselines = true;   // naive, and the open loop beside the closed one
+  int threads = 2;         // two let the baselines run beside the main run; the outcome does not hang on it
 };
 
-/// The free runs of one body: naive (the target's lengths as rest lengths), open loop (the signals alone), closed loop.
+/// Free runs of one body: naive (the target's lengths as rest lengths), open loop (the signals alone), closed loop. Those that
+/// were not wanted are empty; the closed or the open loop is there.
 struct Performances {
-  Replay naive, open_loop;
-  std::optional<Replay> closed_loop;
+  std::optional<Replay> naive, open_loop, closed_loop;
+
+  /// The closed loop where there is one, else the open loop.
+  const Replay& main() const { return closed_loop ? *closed_loop : *open_loop; }
 };
 
 /// How a body differs from its plan: factors on mass, friction and stiffness (with the dashpots).
@@ -46,7 +51,7 @@ Variation variation_of(unsigned seed);
 /// The scene with another body of the same shape.
 physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation);
 
-/// Lets the creature go three times, on the same body, contact and solver. The signals play from their coefficients with all
+/// Lets the creature go as often as wanted, on the same body, contact and solver. The signals play from their coefficients with all
 /// layers.
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 

@@ -115,11 +115,20 @@ bool is_entry_of(const std::string& stage, const std::string& file) {
 
 }  // namespace
 
-std::optional<Record> StageCache::load(const std::string& stage, const std::string& key) const {
-  const fs::path file = directory_ / entry_name(stage, key);
-  std::error_code ignored;
-  if (!fs::is_regular_file(file, ignored)) return std::nullopt;
-  const std::string bytes = read_file(file);
+std::string packed(const Record& record, const std::string& stage, const std::string& key) {
+  Writer writer;
+  writer.bytes = kMagic;
+  writer.put(std::string_view(stage));
+  writer.put(std::string_view(key));
+  writer.put(record.matrices);
+  writer.put(record.index_matrices);
+  writer.put(record.scalars);
+  writer.put(record.strings);
+  writer.bytes += sha256(writer.bytes);
+  return std::move(writer.bytes);
+}
+
+std::optional<Record> unpacked(const std::string& bytes, const std::string& stage, const std::string& key) {
   if (bytes.size() < kMagic.size() + kChecksumSize || !bytes.starts_with(kMagic)) return std::nullopt;
   const std::string_view body = std::string_view(bytes).substr(0, bytes.size() - kChecksumSize);
   if (sha256(body) != std::string_view(bytes).substr(body.size())) return std::nullopt;
@@ -137,18 +146,16 @@ std::optional<Record> StageCache::load(const std::string& stage, const std::stri
   return record;
 }
 
-void StageCache::store(const std::string& stage, const std::string& key, const Record& record) const {
-  Writer writer;
-  writer.bytes = kMagic;
-  writer.put(std::string_view(stage));
-  writer.put(std::string_view(key));
-  writer.put(record.matrices);
-  writer.put(record.index_matrices);
-  writer.put(record.scalars);
-  writer.put(record.strings);
-  writer.bytes += sha256(writer.bytes);
+std::optional<Record> StageCache::load(const std::string& stage, const std::string& key) const {
   const fs::path file = directory_ / entry_name(stage, key);
-  write_file(file, writer.bytes);
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) return std::nullopt;
+  return unpacked(read_file(file), stage, key);
+}
+
+void StageCache::store(const std::string& stage, const std::string& key, const Record& record) const {
+  const fs::path file = directory_ / entry_name(stage, key);
+  write_file(file, packed(record, stage, key));
   for (const fs::directory_entry& entry : fs::directory_iterator(directory_)) {
     if (entry.path() != file && is_entry_of(stage, entry.path().filename().string())) fs::remove(entry.path());
   }

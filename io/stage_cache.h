@@ -16,6 +16,12 @@ struct Record {
   std::map<std::string, std::string> strings;
 };
 
+/// A record as the bytes of a file, with a checksum, under a title that says what it is.
+std::string packed(const Record& record, const std::string& stage, const std::string& key);
+
+/// The record in such bytes; nothing where they are damaged, cut short, of another version or another title.
+std::optional<Record> unpacked(const std::string& bytes, const std::string& stage, const std::string& key);
+
 /// Results of stages in a directory, one file "<stage>-<key>.bin" each. The key is the fingerprint (io/fingerprint.h) of all
 /// that the stage depends on: schema version, inputs, option values. An entry that is damaged, cut short, of another
 /// version, stage or key counts as absent, so that the stage runs again.

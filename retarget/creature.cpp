@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kLargest = 30, kSmallest = 0.01;  // [m] of a creature's longest extent
+constexpr double kSkinRate = 30;                   // [Hz] that will do to look at
 constexpr double kLoopTolerance = 0.02;            // of L
 constexpr double kOwnTravel = 0.05;                // of L: less is a clip in place, which is there to be repeated
 constexpr double kFlight = 0.05;                   // of D above the ground
@@ -25,6 +26,30 @@ void scale_character(Character& character, double scale) {
   for (auto& frame : character.clip.bone_pose) {
     for (Eigen::Affine3d& pose : frame) pose = scaled(pose);
   }
+}
+
+/// The skin's vertices with the moves that made the clip a loop with its travel on the ground. `loop` is the clip as
+/// close_loop leaves it.
+Motion skin_motion(const Character& character, const Motion& loop, const RootMotionResult& root, double ground) {
+  const auto vertices_at = [&](Eigen::Index f) {
+    return skin_positions(character.skeleton, character.skin, character.clip.bone_pose[static_cast<std::size_t>(f)]);
+  };
+  const Eigen::Index frames = loop.count();
+  const Eigen::Index stride = loop.rate_hz > 1.5 * kSkinRate && (!loop.loop || frames % 2 == 0) ? 2 : 1;
+  Motion skin;
+  skin.rate_hz = loop.rate_hz / static_cast<double>(stride);
+  skin.loop = loop.loop;
+  skin.travel = loop.travel + root.travel;
+  skin.yaw = loop.yaw;
+  skin.frames.resize(character.skin.vertices.size(), (frames + stride - 1) / stride);
+  Eigen::Matrix3Xd defect = Eigen::Matrix3Xd::Zero(3, character.skin.vertices.cols());
+  if (loop.loop) defect = closure_defect(loop, vertices_at(0), vertices_at(frames));
+  for (Eigen::Index k = 0; k < skin.count(); ++k) {
+    const Eigen::Index f = k * stride;
+    const Eigen::Vector3d move = root.offset.col(f) - Eigen::Vector3d(0, ground, 0);
+    skin.at(k) = (vertices_at(f) + closure_move(loop, static_cast<double>(f) / static_cast<double>(frames), defect)).colwise() + move;
+  }
+  return skin;
 }
 
 }  // namespace
@@ -90,6 +115,7 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   skin_points.frames = both.frames.bottomRows(3 * points);
   const RootMotionResult root = recover_root_motion(skin_points, creature.length, options.root_motion);
   result.root_motion = root.recovered ? "from feet" : options.root_motion == RootMotion::kNone ? "none" : "clip";
+  const Motion loop = both;
   for (Eigen::Index f = 0; f < both.count(); ++f) {
     for (Eigen::Index i = 0; i < nodes + points; ++i) both.frames.col(f).segment<3>(3 * i) += root.offset.col(f);
   }
@@ -104,6 +130,7 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   result.nodes.frames = both.frames.topRows(3 * nodes);
   result.skin_points = both;
   result.skin_points.frames = both.frames.bottomRows(3 * points);
+  result.skin = skin_motion(character, loop, root, ground);
   return result;
 }
 

@@ -49,6 +49,7 @@ Creature make_creature(const Character& character, const CreatureOptions& option
 struct ImportedMotion {
   Motion nodes;                // 3N x F
   Motion skin_points;          // the contact points' vertices as the clip has them, 3P x F
+  Motion skin;                 // all of its vertices likewise, at 30 Hz where the frames allow, 3V x F
   CouplingReport coupling;
   std::string root_motion;     // "clip", "from feet" or "none"
   std::vector<std::string> warnings;

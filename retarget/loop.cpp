@@ -21,6 +21,18 @@ bool was_made_to_be_played_once(const Motion& frames, const Eigen::VectorXd& mas
   return squared_speed[0] < rest && squared_speed[intervals - 1] < rest && lowest.maxCoeff() > ground + flight_height;
 }
 
+Eigen::Matrix3Xd closure_defect(const Motion& loop, const Eigen::Ref<const Eigen::Matrix3Xd>& start,
+                                const Eigen::Ref<const Eigen::Matrix3Xd>& end) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(loop.yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  return end - ((turn * start).colwise() + loop.travel);
+}
+
+Eigen::Matrix3Xd closure_move(const Motion& loop, double share, const Eigen::Ref<const Eigen::Matrix3Xd>& defect) {
+  const double size = 0.5 * std::pow(std::cos(M_PI * share), 2);
+  if (share >= 0.5) return -size * defect;
+  return size * Eigen::AngleAxisd(-loop.yaw, Eigen::Vector3d::UnitY()).toRotationMatrix() * defect;
+}
+
 Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tolerance, double* defect_out) {
   const Eigen::Index last = frames.count() - 1;
   if (last < 4) return frames;
@@ -42,28 +54,13 @@ Motion close_loop(const Motion& frames, const Eigen::VectorXd& mass, double tole
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
   loop.travel = last_com - turn * first_com;
   loop.travel.y() = 0;
-  Eigen::VectorXd defect(frames.frames.rows());
-  double squared = 0;
-  for (Eigen::Index i = 0; i < mass.size(); ++i) {
-    const Eigen::Vector3d miss = last_shape.col(i) - (turn * first_shape.col(i) + loop.travel);
-    defect.segment<3>(3 * i) = miss;
-    squared += mass[i] * miss.squaredNorm();
-  }
-  const double rms = std::sqrt(squared / total);
+  const Eigen::Matrix3Xd defect = closure_defect(loop, first_shape, last_shape);
+  const double rms = std::sqrt((defect.colwise().squaredNorm() * mass)(0) / total);
   if (defect_out != nullptr) *defect_out = rms;
   if (rms > tolerance) return frames;
-  // Half of the defect at either end, fading to nothing in the middle with flat slopes at the seam; the first half period sees it
-  // before the turn.
   loop.frames.conservativeResize(Eigen::NoChange, last);
   for (Eigen::Index f = 0; f < last; ++f) {
-    const double s = static_cast<double>(f) / static_cast<double>(last);
-    const double ramp = 0.5 * std::pow(std::cos(M_PI * s), 2);
-    const Eigen::Map<const Eigen::Matrix3Xd> miss(defect.data(), 3, mass.size());
-    if (s < 0.5) {
-      loop.at(f) += ramp * turn.transpose() * miss;
-    } else {
-      loop.at(f) -= ramp * miss;
-    }
+    loop.at(f) += closure_move(loop, static_cast<double>(f) / static_cast<double>(last), defect);
   }
   return loop;
 }

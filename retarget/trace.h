@@ -25,4 +25,8 @@ struct Trace {
   Eigen::Index count() const { return time_s.size(); }
 };
 
+/// The trace with a row for every `every` of its steps: forces, moments and activations are means over the longer interval, impulses
+/// sums. Steps at the end that do not fill an interval are left out.
+Trace thinned(const Trace& trace, int every);
+
 }  // namespace hydrostat::retarget

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace hydrostat::cli {
+
+/// Lets a finite number within [least, most] pass. CLI11's own range lets NaN through.
+CLI::Validator number_within(double least, double most);
+
+/// A number that must be finite and within [least, most]. `command` and `option` are what the UsageError names otherwise.
+double parse_number(const std::string& text, double least, double most, const std::string& command, const std::string& option);
+
+}  // namespace hydrostat::cli

@@ -1,0 +1,99 @@
+#include "cli/outcome.h"
+
+#include <cstdio>
+#include <iostream>
+
+#include "cli/command_line.h"
+#include "io/gltf_out.h"
+#include "io/performance_page.h"
+#include "io/report.h"
+#include "retarget/effects.h"
+
+namespace hydrostat::cli {
+
+bool is_down(const retarget::Replay& replay) {
+  return replay.report.fell || replay.termination == physics::Termination::kDiverged;
+}
+
+void report_replays(const retarget::Performances& performances, retarget::RunReport& report) {
+  if (performances.naive) report.naive = performances.naive->report;
+  if (performances.open_loop) report.open_loop = performances.open_loop->report;
+  if (performances.closed_loop) report.closed_loop = performances.closed_loop->report;
+  report.outcome_ok = !is_down(performances.main());
+}
+
+void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
+                   const retarget::Performances& performances, const retarget::RunReport& report) {
+  const retarget::Replay& run = performances.main();
+  const bool down = is_down(run);
+  io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
+                        {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
+                        performer.scene.body.mass, run.motion, {});
+  writer.remove(down ? "replay.glb" : "failed.glb");
+  writer.write("report.json", io::report_json(report));
+  io::write_performance_page(writer.directory() / "report.html", performer, signals, performances, report);
+}
+
+retarget::SignalsReport signals_report(const retarget::SignalSet& signals) {
+  retarget::SignalsReport report;
+  report.kind = signals.kind() == signal::Kind::loop ? "loop" : "one_shot";
+  report.period_s = signals.period_s;
+  report.count = signals.count();
+  report.harmonics = signals.activation.harmonics();
+  return report;
+}
+
+void measure(const retarget::Performer& performer, const retarget::SignalSet& signals, const retarget::PerformOptions& options,
+             retarget::RunReport& report) {
+  report.effects = retarget::effects_of(performer, options.replay);
+  report.accuracy.method = physics::name_of(options.replay.method);
+  report.accuracy.element = "tet";
+  report.accuracy.dt_s = physics::make_stepper(options.replay.method, performer.scene)->substep(options.replay.step_s);
+  report.accuracy.estimated_error_length = retarget::substep_error(performer, signals, options.replay);
+  if (options.seed == 0) return;
+  const retarget::Variation variation = retarget::variation_of(options.seed);
+  char text[200];
+  std::snprintf(text, sizeof text, "--seed %u: the body that was let go has %.4f times the plan's mass, %.4f its friction, %.4f its stiffness",
+                options.seed, variation.mass, variation.friction, variation.stiffness);
+  report.warnings.emplace_back(text);
+}
+
+namespace {
+
+/// How long the creature stays up, and how near to target and clip.
+std::string summary(const retarget::ReplayReport& report, const std::string& where) {
+  char text[300];
+  std::snprintf(text, sizeof text,
+                ": up for %.2f s (%.3g cycles); shape %.2f %% L from the target, %.2f %% L from the clip; travel %.3f L a cycle "
+                "(clip %.3f), drift %.2f %% L a cycle; %.2fx real time",
+                report.duration_s, report.cycles, 100 * report.shape_rms_length, 100 * report.clip_shape_rms_length,
+                report.travel_per_cycle_length, report.clip_travel_per_cycle_length, 100 * report.drift_per_cycle_length,
+                report.real_time_factor);
+  return where + text;
+}
+
+std::string failure(const retarget::Replay& run, const std::string& where, const std::string& motion_file) {
+  const bool diverged = run.termination == physics::Termination::kDiverged;
+  return one_line({where, "replay", diverged ? run.report.fall_cause : "the creature fell: " + run.report.fall_cause,
+                   motion_file + " shows it; try a higher --limit, more --nodes or a calmer clip"});
+}
+
+}  // namespace
+
+int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file) {
+  if (is_down(run)) {
+    std::cerr << failure(run, where, motion_file) << std::endl;
+    return kShortOfTarget;
+  }
+  std::cout << summary(run.report, where) << "\n";
+  return kDone;
+}
+
+int tell_report(const retarget::Replay& run, const std::string& where, const std::string& motion_file,
+                const retarget::RunReport& report) {
+  std::cout << io::report_json(report);
+  if (is_down(run)) std::cerr << failure(run, where, motion_file) << std::endl;
+  return is_down(run) ? kShortOfTarget : kDone;
+}
+
+}  // namespace hydrostat::cli

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+
+#include "io/creature_directory.h"
+#include "retarget/performance.h"
+
+namespace hydrostat::cli {
+
+/// Whether the run fell or diverged.
+bool is_down(const retarget::Replay& replay);
+
+/// Puts the replays' figures into the report.
+void report_replays(const retarget::Performances& performances, retarget::RunReport& report);
+
+/// Writes replay.glb, or failed.glb where the run is down, and takes the other one away; report.json and report.html.
+void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
+                   const retarget::Performances& performances, const retarget::RunReport& report);
+
+/// The figures of a signal set; its error against the activations is not known here.
+retarget::SignalsReport signals_report(const retarget::SignalSet& signals);
+
+/// Fills effects and accuracy by measuring, and tells how the body differs from its plan.
+void measure(const retarget::Performer& performer, const retarget::SignalSet& signals, const retarget::PerformOptions& options,
+             retarget::RunReport& report);
+
+/// Last words of a command. Standard output gets one line of figures, or the report as JSON; standard error, where the run is down,
+/// one line with the cause. Returns the exit code.
+int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file);
+int tell_report(const retarget::Replay& run, const std::string& where, const std::string& motion_file,
+                const retarget::RunReport& report);
+
+}  // namespace hydrostat::cli

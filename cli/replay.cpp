@@ -1,0 +1,174 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <thread>
+
+#include "cli/command_line.h"
+#include "cli/number_option.h"
+#include "cli/outcome.h"
+#include "cli/stages.h"
+#include "io/gltf_out.h"
+#include "io/load_creature.h"
+#include "io/trace_writer.h"
+
+namespace hydrostat::cli {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kCommand = "hydrostat replay";
+constexpr double kLongest = 600;       // [s] of a replay
+constexpr double kFastestPush = 100;   // [m/s] along an axis
+
+struct ReplayCommand {
+  std::string directory, out, trace;
+  double duration = 0, cycles = 0, trace_rate = 0;
+  bool open_loop = false, json = false, quiet = false;
+  std::vector<std::string> pushes;
+  unsigned seed = 0;
+  bool seed_is_given = false;
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+};
+
+UsageError push_error(const std::string& text, const std::string& what) {
+  return {kCommand, "option --push", "'" + text + "' " + what, "Write it like t=2,dv=0.3:0:0 (seconds, metres per second)."};
+}
+
+/// "t=2,dv=0.3:0:0".
+retarget::Push parse_push(const std::string& text, double duration_s) {
+  retarget::Push push;
+  bool has_time = false, has_speed = false;
+  for (const std::string& part : CLI::detail::split(text, ',')) {
+    if (part.starts_with("t=")) {
+      push.time_s = parse_number(part.substr(2), 0, kLongest, kCommand, "--push t");
+      has_time = true;
+    } else if (part.starts_with("dv=")) {
+      const std::vector<std::string> axes = CLI::detail::split(part.substr(3), ':');
+      if (axes.size() != 3) throw push_error(text, "has not three speeds in dv");
+      for (std::size_t k = 0; k < 3; ++k) {
+        push.delta_v[static_cast<Eigen::Index>(k)] = parse_number(axes[k], -kFastestPush, kFastestPush, kCommand, "--push dv");
+      }
+      has_speed = true;
+    } else {
+      throw push_error(text, "has a part '" + part + "' that is neither t nor dv");
+    }
+  }
+  if (!has_time || !has_speed) throw push_error(text, has_time ? "lacks dv" : "lacks t");
+  if (push.time_s >= duration_s) throw push_error(text, "comes after the end of the replay");
+  return push;
+}
+
+/// How many control steps a row of the trace spans.
+int steps_per_row(const ReplayCommand& command, const retarget::ReplayOptions& options) {
+  if (command.trace_rate == 0) return 1;
+  const double control_hz = 1 / (options.step_s * options.steps_per_control);
+  const double every = control_hz / command.trace_rate;
+  if (every < 1 - 1e-9 || std::abs(every - std::round(every)) > 1e-6) {
+    char text[120];
+    std::snprintf(text, sizeof text, "%g Hz is not a whole part of the %g Hz at which the replay is controlled", command.trace_rate, control_hz);
+    throw UsageError(kCommand, "option --trace-rate", text, "Give 120, 60, 40, 30, ...");
+  }
+  return static_cast<int>(std::lround(every));
+}
+
+retarget::PerformOptions perform_options(const ReplayCommand& command, const io::LoadedCreature& creature) {
+  const retarget::Motion& target = creature.target.performer.prepared.target;
+  retarget::PerformOptions options;
+  options.replay.method = io::setting(creature.record, "method", "") == physics::name_of(physics::Method::kEuler)
+                              ? physics::Method::kEuler
+                              : physics::Method::kExplicit;
+  options.replay.duration_s = command.duration > 0  ? command.duration
+                              : command.cycles > 0 ? command.cycles * target.duration_s()
+                                                   : retarget::usual_duration(target);
+  if (options.replay.duration_s > kLongest) {
+    throw UsageError(kCommand, "option --cycles", "so many cycles last longer than 600 s", "Give fewer.");
+  }
+  for (const std::string& push : command.pushes) options.replay.pushes.push_back(parse_push(push, options.replay.duration_s));
+  options.replay.trace = !command.trace.empty();
+  options.seed = command.seed_is_given ? command.seed : static_cast<unsigned>(io::setting(creature.record, "seed", 0.0));
+  options.closed_loop = !command.open_loop;
+  options.baselines = command.out.empty();
+  options.threads = command.threads;
+  return options;
+}
+
+/// The motion alone, for -o.
+int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const retarget::Performances& performances) {
+  const retarget::Replay& run = performances.main();
+  const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
+  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
+                        performer.scene.body.mass, run.motion, {});
+  return tell_run(run, command.directory, file.string());
+}
+
+int replay(const ReplayCommand& command) {
+  if (!command.out.empty() && fs::path(command.out).extension() != ".glb") {
+    throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
+  }
+  Progress progress(std::cerr, progress_style(command.quiet));
+  Stages stages(progress);
+  const int every = steps_per_row(command, {});
+  io::LoadedCreature creature = stages.run("load", [&] { return io::load_creature(command.directory); });
+  const retarget::Performer& performer = creature.target.performer;
+  const retarget::PerformOptions options = perform_options(command, creature);
+  std::optional<io::CreatureWriter> writer;
+  if (command.out.empty()) writer.emplace(command.directory, io::CreatureWriter::Start::amended);
+
+  const retarget::Performances performances =
+      stages.run("replay", [&] { return retarget::perform(performer, creature.signals, options); });
+  if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
+  if (!writer) return write_motion(command, performer, performances);
+
+  retarget::RunReport& report = creature.target.report;
+  const double signal_error = report.signals.error_rms_l0;
+  report.signals = signals_report(creature.signals);
+  report.signals.error_rms_l0 = signal_error;
+  stages.run("measurement", [&] {
+    measure(performer, creature.signals, options, report);
+    return 0;
+  });
+  report_replays(performances, report);
+  report.timing_s = stages.timing_s;
+  write_outcome(*writer, performer, creature.signals, performances, report);
+  writer->commit();
+  const retarget::Replay& run = performances.main();
+  const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();
+  return command.json ? tell_report(run, command.directory, motion_file, report) : tell_run(run, command.directory, motion_file);
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  const auto command = std::make_shared<ReplayCommand>();
+  CLI::App* replay_command = app.add_subcommand("replay", "Simulate a creature again, with its signals as they now are");
+  replay_command->add_option("DIR", command->directory, "Creature, as convert wrote it")->required();
+  CLI::Option* out = replay_command->add_option("-o,--out", command->out, "Write the motion alone, to this .glb file");
+  CLI::Option* duration = replay_command->add_option("--duration", command->duration, "Seconds to simulate [15 cycles, 10 s at most]")
+                              ->check(number_within(0.1, kLongest));
+  replay_command->add_option("--cycles", command->cycles, "The same in periods of the clip")
+      ->check(number_within(0.1, 10000))
+      ->excludes(duration);
+  replay_command->add_flag("--open-loop", command->open_loop, "Leave the corrector out");
+  replay_command->add_option("--push", command->pushes, "t=2,dv=0.3:0:0: a force on the whole body for 0.1 s from t [s] on that would "
+                                                        "change its velocity by dv [m/s]; may be given several times")
+      ->allow_extra_args(false);
+  CLI::Option* seed = replay_command->add_option("--seed", command->seed, "See 'hydrostat convert --help' [the creature's]");
+  CLI::Option* trace = replay_command->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
+  replay_command->add_option("--trace-rate", command->trace_rate, "Rows a second, a whole part of the 120 of the control")
+      ->check(number_within(0.1, 1e6))
+      ->needs(trace);
+  replay_command->add_option("--threads", command->threads, "At most so many; the outcome does not hang on it")
+      ->check(number_within(1, 256));
+  replay_command->add_flag("--json", command->json, "Print the report as JSON")->excludes(out);
+  replay_command->add_flag("--quiet", command->quiet, "No progress");
+  replay_command->callback([command, seed, &exit_code] {
+    command->seed_is_given = seed->count() > 0;
+    exit_code = replay(*command);
+  });
+}
+
+}  // namespace hydrostat::cli

@@ -1,0 +1,74 @@
+#include "io/load_creature.h"
+
+#include "io/body_file.h"
+#include "io/creature_directory.h"
+#include "io/signals_file.h"
+#include "io/write_file.h"
+#include "retarget/error.h"
+
+namespace hydrostat::io {
+namespace {
+
+constexpr const char* kMend = "Make the creature again with 'hydrostat convert'.";
+
+bool has_states(const retarget::ContactSchedule& contacts, Eigen::Index points, Eigen::Index frames) {
+  if (contacts.touching.rows() != points || contacts.touching.cols() != frames) return false;
+  if (contacts.state.size() != contacts.patches.size()) return false;
+  for (std::size_t k = 0; k < contacts.patches.size(); ++k) {
+    if (static_cast<Eigen::Index>(contacts.state[k].size()) != frames) return false;
+    for (const int point : contacts.patches[k].points) {
+      if (point < 0 || point >= points) return false;
+    }
+  }
+  return true;
+}
+
+/// Whether what target.bin holds is about the body of body.json.
+bool target_fits_body(const retarget::Performer& performer) {
+  const Eigen::Index nodes = performer.mesh.nodes.cols(), points = performer.contacts.vertices.size();
+  const retarget::Motion& target = performer.prepared.target;
+  return target.count() > 0 && target.frames.rows() == 3 * nodes && performer.muscles.fields.rows() == performer.mesh.edges.cols() &&
+         performer.muscles.fields.cols() == static_cast<Eigen::Index>(performer.muscles.names.size()) &&
+         performer.clip_points.count() > 0 && performer.clip_points.frames.rows() == 3 * points && performer.clip_skin.count() > 0 &&
+         performer.clip_skin.frames.rows() == performer.skin.vertices.size() && has_states(performer.prepared.contacts, points, target.count());
+}
+
+bool signals_fit_body(const retarget::SignalSet& signals, const physics::Body& body) {
+  return signals.nodes.cols() == body.edges.cols() && signals.nodes == body.edges;
+}
+
+}  // namespace
+
+LoadedCreature load_creature(const std::filesystem::path& creature) {
+  if (!is_creature(creature)) throw Error(creature.string(), "", "is no creature", "Make one with 'hydrostat convert'.");
+  const std::filesystem::path body_file = creature / "body.json", target_file = creature / "target.bin",
+                              signals_file = creature / "signals.json";
+  LoadedCreature loaded;
+  loaded.record = read_creature_record(creature);
+  loaded.target = parse_target(read_file(target_file), target_file.string());
+  parse_body(read_file(body_file), body_file.string(), loaded.target.performer);
+  loaded.signals = read_signals(signals_file);
+  if (!target_fits_body(loaded.target.performer)) throw Error(target_file.string(), "", "does not belong to body.json", kMend);
+  if (!signals_fit_body(loaded.signals, loaded.target.performer.scene.body)) {
+    throw Error(signals_file.string(), "'channels'", "are not the constraints of body.json", kMend);
+  }
+  return loaded;
+}
+
+double setting(const CreatureRecord& record, const std::string& name, double otherwise) {
+  for (const auto& [key, value] : record.settings) {
+    if (key != name) continue;
+    if (const auto* whole = std::get_if<std::int64_t>(&value)) return static_cast<double>(*whole);
+    if (const auto* number = std::get_if<double>(&value)) return *number;
+  }
+  return otherwise;
+}
+
+std::string setting(const CreatureRecord& record, const std::string& name, const std::string& otherwise) {
+  for (const auto& [key, value] : record.settings) {
+    if (const auto* text = std::get_if<std::string>(&value); text != nullptr && key == name) return *text;
+  }
+  return otherwise;
+}
+
+}  // namespace hydrostat::io

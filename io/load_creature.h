@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+
+#include "io/creature_record.h"
+#include "io/stage_records.h"
+
+namespace hydrostat::io {
+
+/// A creature as it lies in its directory, ready to be let go.
+struct LoadedCreature {
+  CreatureRecord record;
+  PerformedTarget target;
+  retarget::SignalSet signals;
+};
+
+/// Reads creature.toml, body.json, target.bin and signals.json; the cache is not needed. Throws Error where a file is missing,
+/// damaged, or does not belong to the others.
+LoadedCreature load_creature(const std::filesystem::path& creature);
+
+/// A setting of creature.toml as a number or text, or `otherwise` where there is none of that kind.
+double setting(const CreatureRecord& record, const std::string& name, double otherwise);
+std::string setting(const CreatureRecord& record, const std::string& name, const std::string& otherwise);
+
+}  // namespace hydrostat::io

@@ -1,0 +1,35 @@
+#pragma once
+
+#include "io/stage_cache.h"
+#include "retarget/creature.h"
+#include "retarget/performance.h"
+
+namespace hydrostat::io {
+
+/// A character as the importer found it, with what it had to decide.
+struct ImportedCharacter {
+  retarget::Character character;
+  std::vector<std::string> warnings;
+};
+
+/// What a replay needs beside body.json and signals.json: of the performer the muscles' fields, the prepared target and the clip,
+/// of the report all that came before the replays.
+struct PerformedTarget {
+  retarget::Performer performer;
+  retarget::RunReport report;
+};
+
+/// Results of stages as records and back, to the bit: of ImportedCharacter, Creature, ImportedMotion, PreparedTarget,
+/// InverseDynamics, Performances (without traces) and PerformedTarget. result_of throws std::out_of_range for a record that
+/// lacks a value.
+template <typename Result>
+Record record_of(const Result& result);
+template <typename Result>
+Result result_of(const Record& record);
+
+/// target.bin: a PerformedTarget, "hydrostat.target/1".
+std::string target_bytes(const PerformedTarget& target);
+/// `file` is what messages call it. Throws Error for bytes that are damaged or of another version.
+PerformedTarget parse_target(const std::string& bytes, const std::string& file);
+
+}  // namespace hydrostat::io

@@ -1,0 +1,115 @@
+#include "retarget/effects.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+
+#include "physics/elastic_forces.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr int kTimings = 5;             // the median counts
+constexpr double kPassSeconds = 0.003;  // of one timing, at least
+constexpr int kContactSteps = 24;       // of one timing of the ground
+constexpr double kFramesPerSecond = 60;  // at which the skin is asked for
+
+double thread_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double median(std::array<double, kTimings> values) {
+  std::sort(values.begin(), values.end());
+  return values[kTimings / 2];
+}
+
+/// Seconds of one call.
+template <typename Work>
+double seconds_of(const Work& work) {
+  std::array<double, kTimings> all;
+  for (double& seconds : all) {
+    const double began = thread_seconds();
+    long calls = 0;
+    do {
+      work();
+      ++calls;
+      seconds = thread_seconds() - began;
+    } while (seconds < kPassSeconds);
+    seconds /= static_cast<double>(calls);
+  }
+  return median(all);
+}
+
+physics::Body without_volume(const physics::Body& body) {
+  physics::Body springs = body;
+  springs.tets.resize(4, 0);
+  springs.tet_edges.resize(6, 0);
+  springs.rest_volume.resize(0);
+  springs.volume_stiffness.resize(0);
+  return springs;
+}
+
+/// Seconds per simulated second of a scene from the target's start.
+double stepping_seconds(const physics::Scene& scene, const physics::State& start, const ReplayOptions& options) {
+  const std::unique_ptr<physics::Stepper> stepper = physics::make_stepper(options.method, scene);
+  physics::Impulses impulses = physics::make_impulses(scene);
+  const Eigen::VectorXd passive = Eigen::VectorXd::Ones(scene.body.edge_count());
+  physics::State state = start;
+  const double began = thread_seconds();
+  for (int k = 0; k < kContactSteps; ++k) stepper->step(options.step_s, passive, nullptr, state, impulses);
+  return (thread_seconds() - began) / (kContactSteps * options.step_s);
+}
+
+double ground_seconds(const physics::Scene& scene, const physics::State& start, const ReplayOptions& options) {
+  physics::Scene free_fall = scene;
+  free_fall.has_ground = false;
+  std::array<double, kTimings> differences;
+  for (double& difference : differences) {
+    difference = stepping_seconds(scene, start, options) - stepping_seconds(free_fall, start, options);
+  }
+  return std::max(0.0, median(differences));
+}
+
+}  // namespace
+
+std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOptions& options) {
+  const physics::Body& body = performer.scene.body;
+  const double substeps = std::round(options.step_s / physics::make_stepper(options.method, performer.scene)->substep(options.step_s));
+  const double passes = substeps / options.step_s;  // over the body, per simulated second
+  physics::State state;
+  MotionCurve(performer.prepared.target).at(0, state.x, state.v);
+  const Eigen::VectorXd passive = Eigen::VectorXd::Ones(body.edge_count());
+  Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, body.node_count());
+  const physics::Body springs = without_volume(body);
+  const auto ms = [](double seconds_per_second) { return 1e3 * seconds_per_second; };
+  const double elastic = seconds_of([&] { physics::add_elastic_forces(body, state.x, passive, force); });
+  const double edges_alone = seconds_of([&] { physics::add_elastic_forces(springs, state.x, passive, force); });
+  const double damping = seconds_of([&] { physics::add_damping_forces(body, state.x, state.v, force); });
+  const double gravity = seconds_of([&] { force.colwise() += performer.scene.gravity; });
+  const double embedding = seconds_of([&] { embedded_positions(performer.embedding, state.x); });
+  const bool pushed = !options.pushes.empty();
+  const double pushing = pushed ? seconds_of([&] { force += state.v; }) : 0;
+
+  return {
+      {"gravity", "on", "9.81 m/s2 downward; timed as a pass over the nodes of its own", ms(gravity * passes)},
+      {"ground", "on", "the target stands and lands on it; friction is solved in the same pass and its cost is in this figure",
+       ms(ground_seconds(performer.scene, state, options))},
+      {"friction", "on", "feet hold by it; its cost cannot be told from the ground's and is counted there", 0},
+      {"obstacles", "off", "there is nothing but the ground", 0},
+      {"self_contact", "off", "not simulated in this version: parts of the body pass through each other", 0},
+      {"volume", "on", "the body keeps the volume of each tet by a spring", ms(std::max(0.0, elastic - edges_alone) * passes)},
+      {"damping", "on", "a dashpot along every constraint; timed as a pass over the constraints of its own", ms(damping * passes)},
+      {"air_drag", "off", "not simulated in this version: the creature moves in still air without drag", 0},
+      {"water", "off", "there is no water", 0},
+      {"pushes", pushed ? "on" : "off", pushed ? "asked for by --push" : "none was asked for", ms(pushing * passes)},
+      {"embedding", "on", "the skin follows the nodes of its tets; counted at 60 frames a second, outside the solver",
+       ms(embedding * kFramesPerSecond)},
+      {"wobble", "off", "not simulated in this version: the skin has no motion of its own", 0},
+      {"fracture", "off", "not simulated in this version: the body does not tear", 0},
+  };
+}
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,102 @@
+#include "retarget/performance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <memory>
+#include <random>
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kVariation = 0.02;  // of mass, friction and stiffness
+constexpr double kErrorSeconds = 1;  // at most, over which the substep's error is measured
+
+using FeedForward = std::function<void(double, Eigen::VectorXd&)>;
+
+FeedForward signals_of(const SignalSet& signals) {
+  const auto player = std::make_shared<signal::Synthesiser>(activations(signals));
+  return [player](double time_s, Eigen::VectorXd& activation) { player->at(time_s, activation); };
+}
+
+/// The target's lengths as rest lengths, within the limit.
+FeedForward target_lengths(const Performer& performer, double limit) {
+  const auto curve = std::make_shared<MotionCurve>(performer.prepared.target);
+  const auto x = std::make_shared<Eigen::Matrix3Xd>(), v = std::make_shared<Eigen::Matrix3Xd>();
+  const physics::Body& body = performer.scene.body;
+  return [curve, x, v, &body, limit](double time_s, Eigen::VectorXd& activation) {
+    curve->at(time_s, *x, *v);
+    for (int e = 0; e < body.edge_count(); ++e) {
+      const double length = (x->col(body.edges(1, e)) - x->col(body.edges(0, e))).norm();
+      activation[e] = std::clamp(length / body.rest_length[e], 1 - limit, 1 + limit);
+    }
+  };
+}
+
+Replay run(const Performer& performer, const physics::Scene& plant, const FeedForward& feed_forward, double limit,
+           const ReplayOptions& options) {
+  const ReplayInput input{plant,        performer.scene,       performer.prepared,
+                          performer.muscles, feed_forward,     performer.clip_points,
+                          performer.scene.contact_points, performer.length, performer.size,
+                          limit};
+  return replay(input, options);
+}
+
+}  // namespace
+
+Variation variation_of(unsigned seed) {
+  if (seed == 0) return {};
+  std::mt19937 generator(seed);
+  const auto factor = [&generator] { return 1 + kVariation * (2 * (static_cast<double>(generator()) / 4294967295.0) - 1); };
+  Variation variation;
+  variation.mass = factor();
+  variation.friction = factor();
+  variation.stiffness = factor();
+  return variation;
+}
+
+physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation) {
+  physics::Scene varied = scene;
+  varied.body.mass *= variation.mass;
+  varied.ground.friction *= variation.friction;
+  varied.body.edge_stiffness *= variation.stiffness;
+  varied.body.volume_stiffness *= variation.stiffness;
+  varied.body.edge_damping *= variation.stiffness;
+  return varied;
+}
+
+Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  const physics::Scene plant = varied_scene(performer.scene, variation_of(options.seed));
+  ReplayOptions baseline = options.replay;
+  baseline.correct = baseline.trace = false;
+  Performances result;
+  const auto run_baselines = [&] {
+    if (!options.baselines) return;
+    result.naive = run(performer, plant, target_lengths(performer, signals.limit), signals.limit, baseline);
+    if (options.closed_loop) result.open_loop = run(performer, plant, signals_of(signals), signals.limit, baseline);
+  };
+  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, run_baselines);
+  ReplayOptions main = options.replay;
+  main.correct = options.closed_loop;
+  (options.closed_loop ? result.closed_loop : result.open_loop) = run(performer, plant, signals_of(signals), signals.limit, main);
+  beside.get();
+  return result;
+}
+
+double substep_error(const Performer& performer, const SignalSet& signals, const ReplayOptions& options) {
+  ReplayOptions coarse = options;
+  coarse.correct = coarse.trace = false;
+  coarse.duration_s = std::min(performer.prepared.target.duration_s(), kErrorSeconds);
+  const double substep = physics::make_stepper(options.method, performer.scene)->substep(options.step_s);
+  const int halves = 2 * static_cast<int>(std::lround(options.step_s / substep));
+  ReplayOptions fine = coarse;
+  fine.step_s = options.step_s / halves;
+  fine.steps_per_control = options.steps_per_control * halves;
+  const Replay a = run(performer, performer.scene, signals_of(signals), signals.limit, coarse);
+  const Replay b = run(performer, performer.scene, signals_of(signals), signals.limit, fine);
+  const Eigen::Index frames = std::min(a.motion.count(), b.motion.count());
+  const double nodes = static_cast<double>(a.motion.frames.rows()) / 3 * static_cast<double>(frames);
+  return (a.motion.frames.leftCols(frames) - b.motion.frames.leftCols(frames)).norm() / std::sqrt(nodes) / performer.length;
+}
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <optional>
+
+#include "retarget/control_mesh.h"
+#include "retarget/replay.h"
+#include "retarget/signal_set.h"
+
+namespace hydrostat::retarget {
+
+/// A creature as its replays need it: no clip and no bones are left.
+struct Performer {
+  SkinnedMesh skin;        // bind pose and triangles; the weights are empty
+  Embedding embedding;     // of the skin's vertices in `mesh`
+  ControlMesh mesh;        // nodes, tets and edges
+  ContactPoints contacts;
+  physics::Scene scene;
+  Muscles muscles;
+  PreparedTarget prepared;
+  Motion clip_points;      // the contact points as the clip has them, 3P x F
+  Motion clip_skin;        // all of the skin likewise, thinned for the eye, 3V x F
+  double length = 1, size = 1;  // L and D [m]
+};
+
+/// Which free runs are wanted, and how.
+struct PerformOptions {
+  ReplayOptions replay;    // `correct` is the run's own; the trace is of the closed loop, or of the open loop where that is the main run
+  unsigned seed = 0;       // 0: the body as it was planned; else see varied_scene
+  bool closed_loop = true; // false: the open loop is the main run
+  bool baselines = true;   // naive, and the open loop beside the closed one
+  int threads = 2;         // two let the baselines run beside the main run; the outcome does not hang on it
+};
+
+/// Free runs of one body: naive (the target's lengths as rest lengths), open loop (the signals alone), closed loop. Those that
+/// were not wanted are empty; the closed or the open loop is there.
+struct Performances {
+  std::optional<Replay> naive, open_loop, closed_loop;
+
+  /// The closed loop where there is one, else the open loop.
+  const Replay& main() const { return closed_loop ? *closed_loop : *open_loop; }
+};
+
+/// How a body differs from its plan: factors on mass, friction and stiffness (with the dashpots).
+struct Variation {
+  double mass = 1, friction = 1, stiffness = 1;
+};
+
+/// Factors drawn evenly within 2 % of 1 by the seed; seed 0 is exactly 1.
+Variation variation_of(unsigned seed);
+
+/// The scene with another body of the same shape.
+physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation);
+
+/// Lets the creature go as often as wanted, on the same body, contact and solver. The signals play from their coefficients with all
+/// layers.
+Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
+
+/// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's
+/// substep is halved.
+double substep_error(const Performer& performer, const SignalSet& signals, const ReplayOptions& options);
+
+}  // namespace hydrostat::retarget

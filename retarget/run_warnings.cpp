@@ -1,0 +1,86 @@
+#include "retarget/run_warnings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kMissingWrench = 0.05;  // [m g] from which it is told
+constexpr double kOverLimit = 1.5;       // of the limit
+constexpr double kNeedShare = 0.99;      // of a clip's strains that the limit should hold
+constexpr double kSaturated = 0.05;      // share of the activations
+constexpr double kMiss = 3e-4;           // per L
+constexpr double kRootResidual = 0.01;   // [m g]
+
+template <typename... Numbers>
+std::string sentence(const char* form, Numbers... numbers) {
+  char text[400];
+  std::snprintf(text, sizeof text, form, numbers...);
+  return text;
+}
+
+std::string patches_in_contact(const ContactSchedule& contacts, std::size_t frame) {
+  std::string names;
+  for (std::size_t k = 0; k < contacts.patches.size(); ++k) {
+    if (contacts.state[k][frame] == ContactState::kOff) continue;
+    names += (names.empty() ? "'" : ", '") + contacts.patches[k].name + "'";
+  }
+  return names.empty() ? "in flight" : "standing on " + names;
+}
+
+/// The strain below which `kNeedShare` of all constraints and frames stay [-].
+double needed_strain(const physics::Body& body, const Motion& target) {
+  std::vector<double> strains;
+  for (Eigen::Index f = 0; f < target.count(); ++f) {
+    const auto x = target.at(f);
+    for (int e = 0; e < body.edge_count(); ++e) {
+      strains.push_back(std::abs((x.col(body.edges(1, e)) - x.col(body.edges(0, e))).norm() / body.rest_length[e] - 1));
+    }
+  }
+  const auto place = strains.begin() + static_cast<long>(kNeedShare * static_cast<double>(strains.size() - 1));
+  std::nth_element(strains.begin(), place, strains.end());
+  return *place;
+}
+
+}  // namespace
+
+std::vector<std::string> target_warnings(const PreparedTarget& prepared, const physics::Body& body, double limit,
+                                         bool limit_is_automatic) {
+  std::vector<std::string> warnings;
+  Eigen::Index worst = 0;
+  const Eigen::RowVectorXd missing = prepared.missing_wrench.colwise().norm();
+  if (missing.size() > 0 && missing.maxCoeff(&worst) > kMissingWrench) {
+    warnings.push_back(sentence("contact cannot give all that the motion needs: %.2f mg are missing at frame %ld, ", missing[worst],
+                                static_cast<long>(worst)) +
+                       patches_in_contact(prepared.contacts, static_cast<std::size_t>(worst)) +
+                       "; slow the motion there or put a foot below it");
+  }
+  const double need = needed_strain(body, prepared.target);
+  if (need > kOverLimit * limit) {
+    warnings.push_back(sentence("the clip bends and stretches constraints by %.0f %%, the limit allows %.0f %%: expect a smaller motion; ",
+                                100 * need, 100 * limit) +
+                       (limit_is_automatic ? "give --limit or more --nodes" : "give a higher --limit"));
+  }
+  return warnings;
+}
+
+std::vector<std::string> inverse_warnings(const InverseReport& inverse) {
+  std::vector<std::string> warnings;
+  if (inverse.saturated > kSaturated) {
+    warnings.push_back(sentence("%.1f %% of the activations are held at the limit of %.2f; give a higher --limit", 100 * inverse.saturated,
+                                inverse.limit));
+  }
+  if (inverse.miss_rms_length > kMiss) {
+    warnings.push_back(sentence("the best activations miss the target by %.2f mm per metre of length in one frame; "
+                                "a higher --limit or more --nodes may bring it nearer",
+                                1e3 * inverse.miss_rms_length));
+  }
+  if (inverse.root_residual_mg > kRootResidual) {
+    warnings.push_back(sentence("contact leaves a net force of %.3f mg that the target needs", inverse.root_residual_mg));
+  }
+  return warnings;
+}
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,35 @@
+#include "retarget/trace.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+/// Row 0 of the result is the trace's; row r the mean of the rows that end its interval. One column a row.
+template <typename Matrix>
+Matrix interval_means(const Matrix& rows, Eigen::Index every) {
+  const Eigen::Index intervals = (rows.cols() - 1) / every;
+  Matrix means(rows.rows(), intervals + 1);
+  means.col(0) = rows.col(0);
+  for (Eigen::Index r = 1; r <= intervals; ++r) means.col(r) = rows.middleCols((r - 1) * every + 1, every).rowwise().mean();
+  return means;
+}
+
+}  // namespace
+
+Trace thinned(const Trace& trace, int every) {
+  if (every == 1 || trace.count() == 0) return trace;
+  const Eigen::Index intervals = (trace.count() - 1) / every;
+  const Eigen::VectorXi ends = Eigen::VectorXi::LinSpaced(intervals + 1, 0, static_cast<int>(intervals * every));
+  Trace result = trace;
+  result.time_s = trace.time_s(ends);
+  result.position = trace.position(Eigen::all, ends);
+  result.velocity = trace.velocity(Eigen::all, ends);
+  result.contact_force = interval_means(trace.contact_force, every);
+  result.effect_force = interval_means(trace.effect_force, every);
+  result.correction_impulse = every * interval_means(trace.correction_impulse, every);
+  result.contact_moment = interval_means(trace.contact_moment, every);
+  result.effect_moment = interval_means(trace.effect_moment, every);
+  result.activation = interval_means(trace.activation, every);
+  return result;
+}
+
+}  // namespace hydrostat::retarget

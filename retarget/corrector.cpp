@@ -15,7 +15,7 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
   contact_stiffness_ = scene.body.mass.sum() * scene.gravity.norm() / (5e-4 * length);
 }
 
-double Corrector::correct(const physics::State& state, const physics::State& reference, const std::vector<bool>& touching, Eigen::VectorXd& activation) {
+double Corrector::correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching, Eigen::VectorXd& activation) {
   const physics::Body& body = scene_.body;
   const int nodes = body.node_count();
   const double th = options_.horizon_s, mass = body.mass.sum();
@@ -23,9 +23,12 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   matrix_.add_mass(body, 1);
   matrix_.add_damping(body, state.x, th);
   matrix_.add_stiffness(body, state.x, activation, th * th);
-  const Eigen::Matrix3d contact_block = th * th * contact_stiffness_ * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d stick_block = th * th * contact_stiffness_ * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d slide_block = th * th * contact_stiffness_ * scene_.ground.normal * scene_.ground.normal.transpose();
   for (int p = 0; p < scene_.contact_points.count(); ++p) {
-    if (touching[static_cast<std::size_t>(p)]) matrix_.add_contact(scene_.contact_points, p, contact_block);
+    const ContactState state_of_point = touching[static_cast<std::size_t>(p)];
+    if (state_of_point == ContactState::kOff) continue;
+    matrix_.add_contact(scene_.contact_points, p, state_of_point == ContactState::kStick ? stick_block : slide_block);
   }
   if (!matrix_.factor()) return 0;
 

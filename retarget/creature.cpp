@@ -12,6 +12,7 @@ constexpr double kGravity = 9.81;
 constexpr double kLargest = 30, kSmallest = 0.01;  // [m] of a creature's longest extent
 constexpr double kSkinRate = 30;                   // [Hz] that will do to look at
 constexpr double kLoopTolerance = 0.02;            // of L
+constexpr double kRecoveredStillSpeed = 0.6;       // of the RMS speed: the pace of a clip in place is known that well
 constexpr double kOwnTravel = 0.05;                // of L: less is a clip in place, which is there to be repeated
 constexpr double kFlight = 0.05;                   // of D above the ground
 
@@ -53,6 +54,12 @@ Motion skin_motion(const Character& character, const Motion& loop, const RootMot
 }
 
 }  // namespace
+
+PrepareOptions prepare_options(const ImportedMotion& imported) {
+  PrepareOptions options;
+  if (imported.travel_recovered) options.contacts.still_speed = kRecoveredStillSpeed;
+  return options;
+}
 
 std::vector<int> bones_of(const ContactPoints& contacts) { return {contacts.bones.data(), contacts.bones.data() + contacts.bones.size()}; }
 
@@ -114,6 +121,7 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   Motion skin_points = both;
   skin_points.frames = both.frames.bottomRows(3 * points);
   const RootMotionResult root = recover_root_motion(skin_points, creature.length, options.root_motion);
+  result.travel_recovered = root.recovered;
   result.root_motion = root.recovered ? "from feet" : options.root_motion == RootMotion::kNone ? "none" : "clip";
   const Motion loop = both;
   for (Eigen::Index f = 0; f < both.count(); ++f) {

@@ -51,11 +51,16 @@ struct ImportedMotion {
   Motion skin_points;          // the contact points' vertices as the clip has them, 3P x F
   Motion skin;                 // all of its vertices likewise, at 30 Hz where the frames allow, 3V x F
   CouplingReport coupling;
+  bool travel_recovered = false;
   std::string root_motion;     // "clip", "from feet" or "none"
   std::vector<std::string> warnings;
 };
 
 ImportedMotion import_motion(const Creature& creature, const CreatureOptions& options);
+
+/// How a clip's contacts are to be read. Where its travel was recovered from its feet the pace is a guess, and what touches the ground is
+/// taken to stand on it.
+PrepareOptions prepare_options(const ImportedMotion& imported);
 
 /// Names of all bones and the bone of each contact point, as label_contacts and prepare want them.
 std::vector<int> bones_of(const ContactPoints& contacts);

@@ -58,6 +58,26 @@ class LinearRows final : public ceres::CostFunction {
   std::vector<RowMajorMatrix> jacobians_;
 };
 
+/// Projected coordinate descent from a feasible x: slow, but every step lowers the cost. For active sets that do not settle.
+void descend_along_coordinates(const BoundedLeastSquares& problem, Eigen::VectorXd& x) {
+  constexpr int kSweeps = 200;
+  const Eigen::SparseMatrix<double> columns = problem.jacobian;
+  Eigen::VectorXd residual = problem.jacobian * x - problem.target;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (int c = 0; c < columns.cols(); ++c) {
+      double slope = 0, curvature = 0;
+      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, c); it; ++it) {
+        slope += it.value() * residual[it.row()];
+        curvature += it.value() * it.value();
+      }
+      if (curvature == 0) continue;
+      const double next = std::clamp(x[c] - slope / curvature, problem.lower[c], problem.upper[c]);
+      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, c); it; ++it) residual[it.row()] += (next - x[c]) * it.value();
+      x[c] = next;
+    }
+  }
+}
+
 }  // namespace
 
 BoundedSolution solve(const BoundedLeastSquares& problem, const Eigen::VectorXd& start, int max_pivots) {
@@ -151,6 +171,7 @@ BoundedSolution solve(const BoundedLeastSquares& problem, const Eigen::VectorXd&
     }
   }
   x = x.cwiseMax(problem.lower).cwiseMin(problem.upper);
+  if (!solution.converged) descend_along_coordinates(problem, x);
   gradient = problem.jacobian.transpose() * (problem.jacobian * x - problem.target);
   for (int c = 0; c < columns; ++c) {
     double violation = std::abs(gradient[c]);

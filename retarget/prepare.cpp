@@ -20,8 +20,9 @@ constexpr double kHold = 1000;           // a contact's pull over a node's tethe
 constexpr double kBalanceWeight = 60;    // W: per mg of missing force
 constexpr double kShiftWeight = 1;       // per L of shift of the COM, per radian of the trunk
 constexpr double kBendWeight = 2;        // per L (radian) of third difference, at 60 Hz
-constexpr double kForceWeight = 0.03;    // per mg of contact force, in the midst of a stance
-constexpr double kEdgeForceWeight[] = {0.25, 0.12, 0.06};  // in its first and last frames: loads come and go gently
+constexpr double kForceWeight = 0.1;     // per mg of contact force, in the midst of a stance
+constexpr double kForceAloneWeight = 0.3; // where the forces alone are sought: makes their split unique
+constexpr double kEdgeForceWeight[] = {0.4, 0.2, 0.13};  // in its first and last frames: loads come and go gently
 
 constexpr double kGoodBalance = 0.02;    // badness (missing force per weight + shift per L) that needs no more contacts
 constexpr double kWorseBalance = 1.5;    // times the least badness: fewer contacts are preferred up to here
@@ -339,7 +340,7 @@ Shift balance(const Motion& target, const physics::Scene& scene, const ContactSc
     for (long k = alpha_column; k < column; ++k) {
       const int point = generators[static_cast<std::size_t>(f)][static_cast<std::size_t>(k - alpha_column)].point;
       const int age = std::min<int>(frames_from_edge(contacts, point, f, target.loop), 3);
-      entries.emplace_back(row, k, may_shift && age < 3 ? kEdgeForceWeight[age] : kForceWeight);
+      entries.emplace_back(row, k, !may_shift ? kForceAloneWeight : age < 3 ? kEdgeForceWeight[age] : kForceWeight);
       target_rows.push_back(0);
       end_block(1);
     }

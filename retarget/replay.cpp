@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kFallSeconds = 0.2, kFallTilt = 50 * M_PI / 180;
 constexpr double kGlideReach = 0.04, kGlideTurn = 0.1, kGlideLeak = 0.3;  // per L; rad; 1/s
+constexpr double kGlideSpeed = 0.15;  // of the target's RMS speed: a slow creature is not asked to catch up fast
 constexpr double kStillSpeed = 0.01;  // of sqrt(g L): a loaded patch that moves faster slides
 
 double thread_seconds() {
@@ -62,10 +63,10 @@ double slope(const std::vector<double>& x, const std::vector<double>& y) {
 
 /// A rigid move in the plane of the ground by which the reference may follow the body, so that legs never chase far targets.
 struct Glide {
+  double reach, turn_reach;  // [m], [rad]: errors up to here are corrected, the reference gives way to larger ones
   double x = 0, z = 0, yaw = 0;
 
-  void follow(const Eigen::Vector3d& com_error, double yaw_error, double length, double seconds) {
-    const double reach = kGlideReach * length;
+  void follow(const Eigen::Vector3d& com_error, double yaw_error, double seconds) {
     const double away = std::hypot(com_error.x() - x, com_error.z() - z);
     if (away > reach) {
       const double share = (away - reach) / away;
@@ -73,7 +74,7 @@ struct Glide {
       z += share * (com_error.z() - z);
     }
     double turn = std::remainder(yaw_error - yaw, 2 * M_PI);
-    if (std::abs(turn) > kGlideTurn) yaw += turn - std::copysign(kGlideTurn, turn);
+    if (std::abs(turn) > turn_reach) yaw += turn - std::copysign(turn_reach, turn);
     const double keep = std::exp(-kGlideLeak * seconds);
     x *= keep, z *= keep, yaw *= keep;
   }
@@ -167,8 +168,10 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
   const physics::State start = state;
   const double rest_volume = physics::volume(body, body.rest);
   Eigen::VectorXd feed_forward(edges), activation(edges);
-  std::vector<bool> touching(static_cast<std::size_t>(scene.contact_points.count()), false);
-  for (std::size_t k = 0; k < touching.size(); ++k) touching[k] = input.prepared.contacts.touching(static_cast<Eigen::Index>(k), 0);
+  std::vector<ContactState> touching(static_cast<std::size_t>(scene.contact_points.count()), ContactState::kOff);
+  for (std::size_t k = 0; k < touching.size(); ++k) {
+    if (input.prepared.contacts.touching(static_cast<Eigen::Index>(k), 0)) touching[k] = ContactState::kStick;
+  }
   Eigen::Matrix3Xd effect(3, nodes), contact_sum = Eigen::Matrix3Xd::Zero(3, scene.contact_points.count());
 
   Replay result;
@@ -207,7 +210,9 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
     record(0, 0);
   }
 
-  Glide glide;
+  const double target_speed = std::sqrt(velocities(target).colwise().squaredNorm().mean() / nodes);
+  const double reach = std::min(kGlideReach * length, kGlideSpeed * target_speed * options.corrector.settle_s);
+  Glide glide{reach, kGlideTurn * reach / (kGlideReach * length)};
   Tally tally;
   double falling_for = 0, busy_seconds = 0, time = 0, highest = -1e300;
   const Eigen::Vector3d start_com = start.x * shares;
@@ -223,7 +228,7 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
     activation = feed_forward;
     if (options.correct) {
       glided = reference;
-      glide.follow(fit.mean_b - fit.mean_a, yaw_of(fit.rotation), length, control_s);
+      glide.follow(fit.mean_b - fit.mean_a, yaw_of(fit.rotation), control_s);
       glide.apply(fit.mean_a, glided);
       const double size = corrector.correct(state, glided, touching, activation);
       tally.correction += size * size;
@@ -308,7 +313,9 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
     double lowest = 0;
     for (int p = 0; p < scene.contact_points.count(); ++p) {
       const bool loaded = contact_sum.col(p).norm() > 1e-6 * weight * control_s;
-      touching[static_cast<std::size_t>(p)] = loaded;
+      const Eigen::Vector3d speed = scene.contact_points.of(state.v, p);
+      const bool slides = (speed - scene.ground.normal.dot(speed) * scene.ground.normal).norm() > kStillSpeed * wave_speed;
+      touching[static_cast<std::size_t>(p)] = !loaded ? ContactState::kOff : slides ? ContactState::kSlide : ContactState::kStick;
       if (loaded) lowest = std::min(lowest, scene.ground.normal.dot(scene.contact_points.of(state.x, p)) - scene.ground.offset);
     }
     report.penetration_max_size = std::max(report.penetration_max_size, -lowest / input.size);

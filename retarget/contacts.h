@@ -30,11 +30,11 @@ struct ContactSchedule {
 struct ContactOptions {
   double height = 0.03;        // per D: a patch touches below this
   double hysteresis = 1.5;     // on height, while it touches
-  double load_height = 0.01;   // per D above the patch's lowest point: what lies higher bears no load
+  double load_height = 0.03;   // per D above the patch's lowest point: what lies higher bears no load
   double still_speed = 0.15;   // of the RMS speed of all points: slower, to the frame before or after, sticks
   double least_still_speed = 0.02;  // of sqrt(g L)
   double fall_speed = 0.12;    // of sqrt(g L): a patch that rises or sinks faster does not touch
-  int least_frames = 3;        // shorter contacts and gaps are closed
+  int least_frames = 4;        // shorter contacts and gaps are closed
 };
 
 /// Labels for the points' motion (height above the ground y = 0). `bone_of_point` names each point's patch.

@@ -15,7 +15,8 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
   contact_stiffness_ = scene.body.mass.sum() * scene.gravity.norm() / (5e-4 * length);
 }
 
-double Corrector::correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching, Eigen::VectorXd& activation) {
+double Corrector::correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching, double grip,
+                          Eigen::VectorXd& activation) {
   const physics::Body& body = scene_.body;
   const int nodes = body.node_count();
   const double th = options_.horizon_s, mass = body.mass.sum();
@@ -72,6 +73,7 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
     rows.block<3, 3>(3, 3 * i) = gyration * body.mass[i] * inverse_inertia * cross;
     weighted_.middleRows<3>(3 * i) = (options_.node_weight * std::sqrt(body.mass[i] / mass) / speed_unit_) * response_.middleRows<3>(3 * i);
   }
+  for (const int row : {0, 2, 4}) rows.row(row) *= grip;
   weighted_.bottomRows<6>().noalias() = (options_.root_weight / speed_unit_) * rows * response_;
 
   normal_.setZero(muscles + 1, muscles + 1);

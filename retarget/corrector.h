@@ -11,7 +11,7 @@ struct CorrectorOptions {
   double horizon_s = 1.0 / 30;  // Th
   double settle_s = 0.3;        // tau
   double node_weight = 0.2;     // of the mass rows
-  double root_weight = 3;       // of the six rows of momentum
+  double root_weight = 6;       // of the six rows of momentum
   double effort = 5;            // eps, per squared muscle, with speeds per sqrt(g L)
   double change = 1e-3;         // eps_d, per squared change of a muscle
 };
@@ -26,8 +26,9 @@ class Corrector {
   Corrector(const physics::Scene& scene, const Muscles& muscles, double length, double limit, const CorrectorOptions& options);
 
   /// Adds the correction to `activation` (E, the feed-forward on entry), clamped to the limit. `touching` P says what each contact
-  /// point does now: a sliding one holds the body up but not back. Returns the RMS of the muscles' correction.
-  double correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching,
+  /// point does now: a sliding one holds the body up but not back. `grip` in [0, 1] weighs the rows of horizontal
+  /// momentum: where contacts are meant to slide, friction sets the ground's sideways force, and pushing harder only slips more. Returns the RMS of the muscles' correction.
+  double correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching, double grip,
                  Eigen::VectorXd& activation);
   void reset() { previous_.setZero(); }
   const Eigen::VectorXd& muscles_now() const { return previous_; }

@@ -24,6 +24,7 @@ constexpr double kForceWeight = 0.1;     // per mg of contact force, in the mids
 constexpr double kForceAloneWeight = 0.3; // where the forces alone are sought: makes their split unique
 constexpr double kEdgeForceWeight[] = {0.4, 0.2, 0.13};  // in its first and last frames: loads come and go gently
 
+constexpr double kTouching = 0.003;        // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;    // badness (missing force per weight + shift per L) that needs no more contacts
 constexpr double kWorseBalance = 1.5;    // times the least badness: fewer contacts are preferred up to here
 
@@ -584,7 +585,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   const Motion locked = target;
   target = project_frames(locked, holds, floor, projector, options.volume, options.smooth_hz);
   report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
-  const auto remark = [&] { mark_touching(point_motion(scene.contact_points, target), 0.3 * options.contacts.load_height * size, result.contacts); };
+  const auto remark = [&] { mark_touching(point_motion(scene.contact_points, target), kTouching * size, result.contacts); };
   remark();
   const Motion before_momentum = target;
   if (options.momentum) {

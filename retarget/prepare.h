@@ -8,7 +8,7 @@ namespace hydrostat::retarget {
 
 struct PrepareOptions {
   double smooth_hz = 10;         // cut-off of the smoothing (half amplitude)
-  double support_friction = 0.8; // of the ground's friction that the plan may use
+  double support_friction = 0.7; // of the ground's friction that the plan may use
   int rounds = 3;                // of volume and momentum
   double clearance = 0.015;      // per D: what is not in contact stays that far above the ground, fading towards contacts
   int clearance_frames = 4;      // over which it fades

@@ -13,6 +13,7 @@ namespace {
 constexpr double kFallSeconds = 0.2, kFallTilt = 50 * M_PI / 180;
 constexpr double kGlideReach = 0.04, kGlideTurn = 0.1, kGlideLeak = 0.3;  // per L; rad; 1/s
 constexpr double kGlideSpeed = 0.15;  // of the target's RMS speed: a slow creature is not asked to catch up fast
+constexpr double kSlidingGrip = 0.0;  // of the corrector's hold on horizontal momentum where a patch is meant to slide
 constexpr double kStillSpeed = 0.01;  // of sqrt(g L): a loaded patch that moves faster slides
 
 double thread_seconds() {
@@ -138,6 +139,23 @@ std::string fall_cause(const ReplayInput& input, const physics::State& state, co
   return text;
 }
 
+/// The frame of the plan at a time.
+long plan_frame_at(const Motion& target, double time_s) {
+  const long frame = static_cast<long>(time_s * target.rate_hz);
+  return target.loop ? frame % target.count() : std::min<long>(frame, target.count() - 1);
+}
+
+/// Share of the patches in contact that are meant to stand; 1 in flight.
+double planned_grip(const PreparedTarget& prepared, double time_s) {
+  const long frame = plan_frame_at(prepared.target, time_s);
+  double standing = 0, sliding = 0;
+  for (const std::vector<ContactState>& states : prepared.contacts.state) {
+    standing += states[static_cast<std::size_t>(frame)] == ContactState::kStick ? 1 : 0;
+    sliding += states[static_cast<std::size_t>(frame)] == ContactState::kSlide ? 1 : 0;
+  }
+  return sliding > 0 ? kSlidingGrip * standing / (standing + sliding) : 1;
+}
+
 }  // namespace
 
 double usual_duration(const Motion& target) {
@@ -230,7 +248,7 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
       glided = reference;
       glide.follow(fit.mean_b - fit.mean_a, yaw_of(fit.rotation), control_s);
       glide.apply(fit.mean_a, glided);
-      const double size = corrector.correct(state, glided, touching, activation);
+      const double size = corrector.correct(state, glided, touching, planned_grip(input.prepared, time), activation);
       tally.correction += size * size;
       ++tally.corrections;
       corrections.push_back(size);
@@ -320,8 +338,7 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
     }
     report.penetration_max_size = std::max(report.penetration_max_size, -lowest / input.size);
     double slip_speed = 0;
-    const long plan_frame = target.loop ? static_cast<long>(time * target.rate_hz) % target.count()
-                                        : std::min<long>(static_cast<long>(time * target.rate_hz), target.count() - 1);
+    const long plan_frame = plan_frame_at(target, time);
     for (std::size_t k = 0; k < patches; ++k) {
       const Patch& patch = input.prepared.contacts.patches[k];
       double load = 0, gap = 1e300;

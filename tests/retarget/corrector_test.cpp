@@ -49,7 +49,7 @@ TEST(Corrector, DoesNothingOnTheNominalPath) {
     const Eigen::VectorXd given = physics::random_activation(random, controlled.creature.scene.body, 0.2);
     Eigen::VectorXd activation = given;
     Corrector corrector = controlled.corrector();
-    EXPECT_EQ(corrector.correct(state, state, controlled.standing, activation), 0);
+    EXPECT_EQ(corrector.correct(state, state, controlled.standing, 1, activation), 0);
     EXPECT_EQ(activation, given);
   }
 }
@@ -62,7 +62,7 @@ TEST(Corrector, PushesBackAgainstAnErrorOfVelocity) {
     state.v.colwise() += 0.2 * direction;
     Corrector corrector = controlled.corrector();
     Eigen::VectorXd activation = controlled.passive;
-    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, activation), 0);
+    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, 1, activation), 0);
     EXPECT_LT(controlled.gained(state, activation, direction, 1.0 / 30), 0);
   }
 }
@@ -74,7 +74,7 @@ TEST(Corrector, PushesBackAgainstAnErrorOfPlace) {
     reference.x.colwise() -= 0.02 * direction;
     Corrector corrector = controlled.corrector();
     Eigen::VectorXd activation = controlled.passive;
-    corrector.correct(controlled.rest, reference, controlled.standing, activation);
+    corrector.correct(controlled.rest, reference, controlled.standing, 1, activation);
     EXPECT_LT(controlled.gained(controlled.rest, activation, direction, 1.0 / 30), 0);
   }
 }
@@ -86,7 +86,7 @@ TEST(Corrector, CannotMoveTheCentreOfMassInTheAir) {
   state.v.colwise() += Eigen::Vector3d(0.2, 0, 0);
   Eigen::VectorXd in_flight = controlled.passive, on_feet = controlled.passive;
   Corrector a = controlled.corrector(), b = controlled.corrector();
-  EXPECT_LT(a.correct(state, controlled.rest, controlled.flying, in_flight), 0.01 * b.correct(state, controlled.rest, controlled.standing, on_feet));
+  EXPECT_LT(a.correct(state, controlled.rest, controlled.flying, 1, in_flight), 0.01 * b.correct(state, controlled.rest, controlled.standing, 1, on_feet));
 }
 
 TEST(Corrector, KeepsToTheLimit) {
@@ -99,7 +99,7 @@ TEST(Corrector, KeepsToTheLimit) {
     state.v.colwise() += Eigen::Vector3d(8, 0, 0);
     Eigen::VectorXd activation = physics::random_activation(random, controlled.creature.scene.body, kLimit);
     Corrector corrector = controlled.corrector();
-    corrector.correct(state, controlled.rest, controlled.standing, activation);
+    corrector.correct(state, controlled.rest, controlled.standing, 1, activation);
     EXPECT_LE(activation.maxCoeff(), 1 + kLimit);
     EXPECT_GE(activation.minCoeff(), 1 - kLimit);
     EXPECT_GT((activation.array() - 1).abs().maxCoeff(), 0.999 * kLimit);
@@ -113,9 +113,9 @@ TEST(Corrector, AnswersTwiceTheErrorWithTwiceTheMuscles) {
   twice.v.colwise() += Eigen::Vector3d(0.1, 0, 0.04);
   Eigen::VectorXd activation = controlled.passive;
   Corrector a = controlled.corrector(), b = controlled.corrector();
-  a.correct(once, controlled.rest, controlled.standing, activation);
+  a.correct(once, controlled.rest, controlled.standing, 1, activation);
   activation = controlled.passive;
-  b.correct(twice, controlled.rest, controlled.standing, activation);
+  b.correct(twice, controlled.rest, controlled.standing, 1, activation);
   EXPECT_LT((2 * a.muscles_now() - b.muscles_now()).norm(), 1e-9 * b.muscles_now().norm());
 }
 
@@ -129,7 +129,7 @@ TEST(Corrector, LessEffortIsSpentWhereItCostsMore) {
     options.effort = effort;
     Corrector corrector = controlled.corrector(options);
     Eigen::VectorXd activation = controlled.passive;
-    const double spent = corrector.correct(state, controlled.rest, controlled.standing, activation);
+    const double spent = corrector.correct(state, controlled.rest, controlled.standing, 1, activation);
     EXPECT_LT(spent, last);
     last = spent;
   }
@@ -141,9 +141,9 @@ TEST(Corrector, ForgetsWhenReset) {
   state.v.colwise() += Eigen::Vector3d(0.2, 0, 0);
   Corrector corrector = controlled.corrector();
   Eigen::VectorXd first = controlled.passive, again = controlled.passive;
-  corrector.correct(state, controlled.rest, controlled.standing, first);
+  corrector.correct(state, controlled.rest, controlled.standing, 1, first);
   corrector.reset();
-  corrector.correct(state, controlled.rest, controlled.standing, again);
+  corrector.correct(state, controlled.rest, controlled.standing, 1, again);
   EXPECT_EQ(first, again);
 }
 

@@ -32,8 +32,9 @@ constexpr double kMiss = 3e-4, kRootResidual = 0.01, kSaturated = 0.05;
 
 // Of a trace at the rate of the control.
 constexpr double kMomentum = 1e-6;       // [mg]
-constexpr double kAngularMomentum = 2e-3;  // [mgL]: the moments of gravity are taken at the row's middle
-constexpr double kPathMiss = 0.25;       // of the mean way in a row
+constexpr double kAngularMomentum = 1e-3;  // [mgL]: the moment of gravity is taken at the row's middle
+constexpr double kContactMoment = 0.03;    // [mgL]: of the forces at the row's middle, between which the nodes shake
+constexpr double kPathMiss = 0.3;          // of the way: landing and standing shake within a row
 constexpr double kNearGround = 0.002;    // [per L]
 
 const std::map<std::string, std::set<std::string>> kReportGroups{
@@ -116,9 +117,10 @@ void expect_honest_trace(const fs::path& directory, const std::string& creature)
   EXPECT_NEAR(audit.slowest_row_s, 1.0 / 120, 1e-9);
   EXPECT_NEAR(audit.fastest_row_s, 1.0 / 120, 1e-9);
   EXPECT_LE(audit.path_miss, kPathMiss);
+  EXPECT_LE(audit.com_path_miss, 1);
   EXPECT_LE(audit.momentum_mg, kMomentum);
   EXPECT_LE(audit.angular_mgl, kAngularMomentum);
-  EXPECT_LE(audit.moment_mgl, kAngularMomentum);
+  EXPECT_LE(audit.moment_mgl, kContactMoment);
   EXPECT_LE(audit.cone_excess_mg, 1e-9);
   EXPECT_LE(audit.pull_mg, 1e-12);
   EXPECT_LE(audit.loaded_height_m, kNearGround * length);

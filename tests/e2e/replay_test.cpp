@@ -89,6 +89,7 @@ TEST_F(Replay, TracesTheMeansOverLongerRows) {
   EXPECT_LE(fine.momentum_mg, 1e-6);
   EXPECT_LE(coarse.momentum_mg, 1e-6);
   EXPECT_LE(coarse.cone_excess_mg, 1e-9);
+  EXPECT_LT(fine.path_miss, 0.7 * coarse.path_miss);  // positions follow velocities the better the shorter the rows
 }
 
 TEST_F(Replay, RefusesWhatItCannotDo) {

@@ -11,11 +11,13 @@
 
 namespace hydrostat {
 
-/// What a trace says about itself, from masses, positions, velocities and forces alone; each the largest over the rows.
+/// What a trace says about itself, from masses, positions, velocities and forces alone; the largest over the rows where nothing else
+/// is said.
 struct TraceAudit {
   double duration_s = 0;
   double slowest_row_s = 0, fastest_row_s = 1e300;  // lengths of the rows
-  double path_miss = 0;         // RMS over the nodes of x' - x - dt (v + v') / 2, per dt times the RMS speed in the trace
+  double path_miss = 0;         // RMS of x' - x - dt (v + v') / 2 over all nodes and rows, per that of dt v'
+  double com_path_miss = 0;     // the same of the COM, per what the row's forces allow: dt^2 / 2 (|contact| / M + g)
   double momentum_mg = 0;       // |dP/dt - M g - contact - effects| / (M g)
   double angular_mgl = 0;       // the same of the angular momentum about the origin, per M g L
   double moment_mgl = 0;        // booked contact moment against that of the node forces at the row's middle
@@ -59,11 +61,7 @@ inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::fil
   TraceAudit found;
   found.duration_s = time.values.back();
   const std::size_t rows = time.values.size();
-  double mean_square_speed = 0;
-  for (std::size_t s = 0; s < rows; ++s) {
-    mean_square_speed += audit::points(velocity, s).squaredNorm() / static_cast<double>(nodes) / static_cast<double>(rows);
-  }
-  const double speed = std::sqrt(mean_square_speed);
+  double squared_miss = 0, squared_way = 0;
   for (const double impulse : correction.values) found.correction_ns = std::max(found.correction_ns, std::abs(impulse));
 
   for (std::size_t s = 1; s < rows; ++s) {
@@ -73,8 +71,11 @@ inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::fil
     const Eigen::Matrix3Xd x0 = audit::points(position, s - 1), x1 = audit::points(position, s);
     const Eigen::Matrix3Xd v0 = audit::points(velocity, s - 1), v1 = audit::points(velocity, s);
     const Eigen::Matrix3Xd f = audit::points(contact, s), e = audit::points(effect, s), middle = 0.5 * (x0 + x1);
-    const double miss = (x1 - x0 - 0.5 * dt * (v0 + v1)).norm() / std::sqrt(static_cast<double>(nodes));
-    found.path_miss = std::max(found.path_miss, miss / (dt * speed));
+    const Eigen::Matrix3Xd miss = x1 - x0 - 0.5 * dt * (v0 + v1);
+    squared_miss += miss.squaredNorm();
+    squared_way += dt * dt * v1.squaredNorm();
+    const double allowed = 0.5 * dt * dt * (f.rowwise().sum().norm() / total + 9.81);
+    found.com_path_miss = std::max(found.com_path_miss, (miss * m / total).norm() / allowed);
 
     const Eigen::Vector3d force = f.rowwise().sum() + e.rowwise().sum();
     const Eigen::Vector3d change = (v1 - v0) * m / dt;
@@ -108,6 +109,7 @@ inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::fil
       found.loaded_height_m = std::max(found.loaded_height_m, height[i]);
     }
   }
+  found.path_miss = std::sqrt(squared_miss / squared_way);
   return found;
 }
 

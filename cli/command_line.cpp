@@ -14,7 +14,8 @@ std::string subcommand_in_use(const CLI::App& app) {
   return chosen.empty() ? "hydrostat" : "hydrostat " + chosen.front()->get_name();
 }
 
-/// CLI11 writes "--jobs: Value 0 not in range" or "CLIP is required": the option moves to the place of the message.
+/// CLI11 writes "--jobs: Value 0 not in range", "Could not convert: --jobs = 1.5" or "CLIP is required": the option moves to the
+/// place of the message.
 UsageError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::string command = subcommand_in_use(app);
   if (app.get_subcommands().empty() && !app.remaining().empty()) {
@@ -22,6 +23,10 @@ UsageError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   }
   std::string what = error.what();
   std::string where = "command line";
+  const std::string unreadable = "Could not convert: ";
+  if (const std::size_t equals = what.find(" = "); what.starts_with(unreadable + "--") && equals != std::string::npos) {
+    what = what.substr(unreadable.size(), equals - unreadable.size()) + ": '" + what.substr(equals + 3) + "' is not a whole number of its range";
+  }
   const std::size_t colon = what.find(": ");
   if (what.starts_with("--") && colon != std::string::npos) {
     where = "option " + what.substr(0, colon);

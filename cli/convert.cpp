@@ -78,22 +78,21 @@ io::ImportedCharacter import(const ConvertOptions& options) {
   return imported;
 }
 
-retarget::SignalSet solved_signals(const retarget::InverseDynamics& inverse, const retarget::Creature& creature,
-                                   const retarget::Muscles& muscles, const retarget::Motion& target, const std::string& file) {
-  const physics::Body& body = creature.scene.body;
+retarget::SignalSet solved_signals(const retarget::InverseDynamics& inverse, const retarget::Performer& performer,
+                                   const std::string& file, const std::string& clip) {
+  const physics::Body& body = performer.scene.body;
+  const retarget::Motion& target = performer.prepared.target;
   const retarget::SolvedSignals solved{target.loop ? signal::Kind::loop : signal::Kind::one_shot,
                                        target.duration_s(),
                                        inverse.report.limit,
                                        inverse.activation.transpose(),
                                        inverse.penalty_force.transpose(),
-                                       muscles.edge_bone,
+                                       performer.muscles.edge_bone,
                                        body.edges,
                                        body.rest_length,
                                        body.edge_stiffness};
   const std::string broken = retarget::broken_rule({}, solved.kind, static_cast<int>(solved.activation.rows()));
-  if (!broken.empty()) {
-    throw Error(file, "clip '" + creature.character.clip.name + "'", broken, "Give a longer clip.");
-  }
+  if (!broken.empty()) throw Error(file, "clip '" + clip + "'", broken, "Give a longer clip.");
   return retarget::analyse_signals(solved, {});
 }
 
@@ -105,7 +104,7 @@ std::vector<std::string> keep_earlier_layers(const fs::path& creature, retarget:
 }
 
 retarget::Performer make_performer(const retarget::Creature& creature, const retarget::ImportedMotion& motion,
-                                   const retarget::PreparedTarget& prepared, const retarget::Muscles& muscles) {
+                                   retarget::PreparedTarget prepared) {
   retarget::Performer performer;
   performer.skin.vertices = creature.character.skin.vertices;
   performer.skin.triangles = creature.character.skin.triangles;
@@ -113,8 +112,8 @@ retarget::Performer make_performer(const retarget::Creature& creature, const ret
   performer.mesh = creature.mesh;
   performer.contacts = creature.contacts;
   performer.scene = creature.scene;
-  performer.muscles = muscles;
-  performer.prepared = prepared;
+  performer.muscles = retarget::make_muscles(creature.scene.body, creature.character.skeleton, creature.mesh.bone_weights);
+  performer.prepared = std::move(prepared);
   performer.clip_points = motion.skin_points;
   performer.clip_skin = motion.skin;
   performer.length = creature.length;
@@ -166,110 +165,149 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   return record;
 }
 
-void add(std::vector<std::string>& warnings, const std::vector<std::string>& more) {
-  warnings.insert(warnings.end(), more.begin(), more.end());
-}
-
 Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
   Eigen::VectorXi bones(bone_weights.cols());
   for (Eigen::Index i = 0; i < bones.size(); ++i) bone_weights.col(i).maxCoeff(&bones[i]);
   return bones;
 }
 
+/// The stages behind the import, in the order of the road; each leaves its result for those behind it.
+class Conversion {
+ public:
+  Conversion(const ConvertOptions& options, Stages& stages, io::CreatureWriter& writer)
+      : options_(options), settings_(creature_options(options)), stages_(stages), writer_(writer) {
+    stages_.use_cache(writer.cache_directory());
+  }
+
+  void run(const io::ImportedCharacter& imported, double wished_limit) {
+    add_warnings(imported.warnings);
+    make_body(imported);
+    find_activations(wished_limit);
+    solve_signals();
+    let_go();
+    write();
+  }
+
+  const retarget::Performances& performances() const { return performances_; }
+  const retarget::RunReport& report() const { return target_.report; }
+
+ private:
+  void add_warnings(const std::vector<std::string>& more) {
+    std::vector<std::string>& warnings = target_.report.warnings;
+    warnings.insert(warnings.end(), more.begin(), more.end());
+  }
+
+  void make_body(const io::ImportedCharacter& imported) {
+    key_ = key_after(key_of(imported), options_.height, options_.nodes);
+    creature_ = stages_.run("body", key_, [&] { return retarget::make_creature(imported.character, settings_); });
+    creature_.scene.ground.friction = options_.friction;  // of the ground, not of the body: what is cached may have another
+    key_ = key_after(key_, options_.root_motion);
+    motion_ = stages_.run("coupling", key_, [&] { return retarget::import_motion(creature_, settings_); });
+    add_warnings(creature_.warnings);
+    add_warnings(motion_.warnings);
+  }
+
+  /// wished_limit 0: automatic.
+  void find_activations(double wished_limit) {
+    const physics::Scene& scene = creature_.scene;
+    key_ = key_after(key_, options_.friction);
+    retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] {
+      return retarget::prepare(motion_.nodes, scene, retarget::bones_of(creature_.contacts), creature_.character.skeleton.names,
+                               creature_.mesh.bone_weights, creature_.length, creature_.size, {});
+    });
+    retarget::InverseOptions inverse_options;
+    inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);
+    inverse_options.threads = options_.threads;
+    key_ = key_after(key_, inverse_options.limit);
+    inverse_ = stages_.run("inverse_dynamics", key_, [&] {
+      return retarget::solve_inverse_dynamics(prepared, scene, creature_.length, inverse_options);
+    });
+    add_warnings(prepared.warnings);
+    add_warnings(retarget::target_warnings(prepared, scene.body, inverse_options.limit, wished_limit == 0));
+    add_warnings(retarget::inverse_warnings(inverse_.report));
+    target_.performer = make_performer(creature_, motion_, std::move(prepared));
+  }
+
+  void solve_signals() {
+    signals_ = stages_.run("signals", [&] {
+      return solved_signals(inverse_, target_.performer, options_.clip_file, creature_.character.clip.name);
+    });
+    retarget::RunReport& report = target_.report;
+    report.source = source_report(options_, creature_, motion_);
+    report.body = body_report(creature_);
+    report.coupling = motion_.coupling;
+    report.preparation = target_.performer.prepared.report;
+    report.inverse = inverse_.report;
+    report.signals = signals_report(signals_);
+    report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
+    target_file_ = io::target_bytes(target_);  // before what a replay will tell anew
+    add_warnings(keep_earlier_layers(options_.out, signals_));
+    signals_text_ = io::signals_text(signals_);
+  }
+
+  void let_go() {
+    retarget::PerformOptions perform_options;
+    perform_options.replay.method = settings_.method;
+    perform_options.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
+    perform_options.seed = options_.seed;
+    perform_options.threads = options_.threads;
+    key_ = key_after(key_, signals_text_, physics::name_of(settings_.method), std::int64_t{options_.seed});
+    performances_ = stages_.run("replay", key_, [&] { return retarget::perform(target_.performer, signals_, perform_options); });
+    report_replays(performances_, target_.report);
+    stages_.run("measurement", [&] {
+      measure(target_.performer, signals_, perform_options, target_.report);
+      return 0;
+    });
+  }
+
+  void write() {
+    const retarget::Performer& performer = target_.performer;
+    stages_.run("files", [&] {
+      writer_.write("creature.toml", io::to_toml(creature_record(options_, target_.report)));
+      writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
+                                               dominant_bones_of_nodes(creature_.mesh.bone_weights)));
+      writer_.write("target.bin", target_file_);
+      writer_.write("signals.json", signals_text_);
+      io::write_skinned_glb(writer_.directory() / "reference.glb",
+                            {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
+                            performer.scene.body.mass, performer.prepared.target, {});
+      return 0;
+    });
+    target_.report.timing_s = stages_.timing_s;
+    write_outcome(writer_, performer, signals_, performances_, target_.report);
+  }
+
+  const ConvertOptions& options_;
+  const retarget::CreatureOptions settings_;
+  Stages& stages_;
+  io::CreatureWriter& writer_;
+  std::string key_;  // of the last stage
+  retarget::Creature creature_;
+  retarget::ImportedMotion motion_;
+  retarget::InverseDynamics inverse_;
+  io::PerformedTarget target_;
+  retarget::SignalSet signals_;
+  retarget::Performances performances_;
+  std::string target_file_, signals_text_;
+};
+
 int convert(const ConvertOptions& options) {
-  const bool limit_is_automatic = options.limit == "auto";
   const double wished_limit =
-      limit_is_automatic ? 0 : parse_number(options.limit, kLeastLimit, kMostLimit, "hydrostat convert", "--limit");
-  const retarget::CreatureOptions settings = creature_options(options);
+      options.limit == "auto" ? 0 : parse_number(options.limit, kLeastLimit, kMostLimit, "hydrostat convert", "--limit");
   Progress progress(std::cerr, progress_style(options.quiet));
   Stages stages(progress);
-  io::PerformedTarget target;
-  retarget::RunReport& report = target.report;
-
   const io::ImportedCharacter imported = stages.run("import", [&] { return import(options); });
   io::CreatureWriter writer(options.out, io::CreatureWriter::Start::afresh);
-  stages.use_cache(writer.cache_directory());
-
-  const std::string body_key = key_after(key_of(imported), options.height, options.nodes);
-  retarget::Creature creature =
-      stages.run("body", body_key, [&] { return retarget::make_creature(imported.character, settings); });
-  creature.scene.ground.friction = options.friction;  // of the ground, not of the body: what is cached may have another
-  const std::string motion_key = key_after(body_key, options.root_motion);
-  const auto motion = stages.run("coupling", motion_key, [&] { return retarget::import_motion(creature, settings); });
-
-  const std::string prepare_key = key_after(motion_key, options.friction);
-  const auto prepared = stages.run("preparation", prepare_key, [&] {
-    return retarget::prepare(motion.nodes, creature.scene, retarget::bones_of(creature.contacts), creature.character.skeleton.names,
-                             creature.mesh.bone_weights, creature.length, creature.size, {});
-  });
-
-  retarget::InverseOptions inverse_options;
-  inverse_options.limit =
-      limit_is_automatic ? retarget::automatic_limit(creature.scene.body, prepared.target) : wished_limit;
-  inverse_options.threads = options.threads;
-  const std::string inverse_key = key_after(prepare_key, inverse_options.limit);
-  const auto inverse = stages.run("inverse_dynamics", inverse_key, [&] {
-    return retarget::solve_inverse_dynamics(prepared, creature.scene, creature.length, inverse_options);
-  });
-
-  const retarget::Muscles muscles =
-      retarget::make_muscles(creature.scene.body, creature.character.skeleton, creature.mesh.bone_weights);
-  std::vector<std::string> layers_told;
-  const retarget::SignalSet signals = stages.run("signals", [&] {
-    retarget::SignalSet set = solved_signals(inverse, creature, muscles, prepared.target, options.clip_file);
-    layers_told = keep_earlier_layers(options.out, set);
-    return set;
-  });
-  target.performer = make_performer(creature, motion, prepared, muscles);
-
-  retarget::PerformOptions perform_options;
-  perform_options.replay.method = settings.method;
-  perform_options.replay.duration_s = retarget::usual_duration(prepared.target);
-  perform_options.seed = options.seed;
-  perform_options.threads = options.threads;
-  const std::string signals_text = io::signals_text(signals);
-  const std::string replay_key = key_after(inverse_key, signals_text, physics::name_of(settings.method), std::int64_t{options.seed});
-  const auto performances =
-      stages.run("replay", replay_key, [&] { return retarget::perform(target.performer, signals, perform_options); });
-
-  report.source = source_report(options, creature, motion);
-  report.body = body_report(creature);
-  report.coupling = motion.coupling;
-  report.preparation = prepared.report;
-  report.inverse = inverse.report;
-  report.signals = signals_report(signals);
-  report.signals.error_rms_l0 = retarget::activation_error_rms(signals, inverse.activation.transpose());
-  add(report.warnings, imported.warnings);
-  add(report.warnings, creature.warnings);
-  add(report.warnings, motion.warnings);
-  add(report.warnings, prepared.warnings);
-  add(report.warnings, retarget::target_warnings(prepared, creature.scene.body, inverse_options.limit, limit_is_automatic));
-  add(report.warnings, retarget::inverse_warnings(inverse.report));
-  const std::string target_file = io::target_bytes(target);
-  add(report.warnings, layers_told);
-  stages.run("measurement", [&] {
-    measure(target.performer, signals, perform_options, report);
-    return 0;
-  });
-  report_replays(performances, report);
-
-  stages.run("files", [&] {
-    writer.write("creature.toml", io::to_toml(creature_record(options, report)));
-    writer.write("body.json", io::body_text(target.performer, creature.character.skeleton.names,
-                                            dominant_bones_of_nodes(creature.mesh.bone_weights)));
-    writer.write("target.bin", target_file);
-    writer.write("signals.json", signals_text);
-    io::write_skinned_glb(writer.directory() / "reference.glb",
-                          {target.performer.skin.vertices, target.performer.skin.triangles, target.performer.embedding},
-                          target.performer.mesh, target.performer.scene.body.mass, prepared.target, {});
-    return 0;
-  });
-  report.timing_s = stages.timing_s;
-  write_outcome(writer, target.performer, signals, performances, report);
+  Conversion conversion(options, stages, writer);
+  try {
+    conversion.run(imported, wished_limit);
+  } catch (const Error& error) {
+    throw writer.as_seen(error);
+  }
   writer.commit();
-  const retarget::Replay& run = performances.main();
+  const retarget::Replay& run = conversion.performances().main();
   const std::string motion_file = (fs::path(options.out) / "failed.glb").string();
-  return options.json ? tell_report(run, options.out, motion_file, report) : tell_run(run, options.out, motion_file);
+  return options.json ? tell_report(run, options.out, motion_file, conversion.report()) : tell_run(run, options.out, motion_file);
 }
 
 }  // namespace

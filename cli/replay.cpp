@@ -133,7 +133,11 @@ int replay(const ReplayCommand& command) {
   });
   report_replays(performances, report);
   report.timing_s = stages.timing_s;
-  write_outcome(*writer, performer, creature.signals, performances, report);
+  try {
+    write_outcome(*writer, performer, creature.signals, performances, report);
+  } catch (const Error& error) {
+    throw writer->as_seen(error);
+  }
   writer->commit();
   const retarget::Replay& run = performances.main();
   const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();

@@ -13,7 +13,6 @@
 #include <system_error>
 
 #include "io/write_file.h"
-#include "retarget/error.h"
 
 namespace hydrostat::io {
 
@@ -158,6 +157,12 @@ void CreatureWriter::carry_over(bool everything) {
 
 void CreatureWriter::write(const std::string& name, std::string_view bytes) {
   write_file(part_ / name, bytes, shown_as_ / name);
+}
+
+Error CreatureWriter::as_seen(const Error& error) const {
+  const std::string part = part_.string();
+  if (!error.file.starts_with(part)) return error;
+  return {shown_as_.string() + error.file.substr(part.size()), error.where, error.what(), error.mend};
 }
 
 void CreatureWriter::remove(const std::string& name) {

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "retarget/error.h"
+
 namespace hydrostat::io {
 
 /// Writes a creature directory whole or not at all. Everything goes into a hidden directory beside it (".NAME.part-..."),
@@ -31,6 +33,8 @@ class CreatureWriter {
 
   /// One file of the creature, `name` relative to it. Throws Error (full disk and the like) that names its final path.
   void write(const std::string& name, std::string_view bytes);
+  /// The same error with the creature's path where the file it names lies in `directory()`.
+  Error as_seen(const Error& error) const;
   /// Takes a file out of the creature, if it is there.
   void remove(const std::string& name);
   /// Puts the new creature in the place of the old one. To be called once, last. Throws Error, and the old one stays.

@@ -1,0 +1,304 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "tests/e2e/made_creature.h"
+#include "tests/e2e/trace_audit.h"
+
+namespace hydrostat {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// What a sample must reach with the default settings.
+struct Gate {
+  const char* clip;
+  const char* kind;                     // of its signals
+  bool stays_up;
+  double cycles;                        // at least
+  double shape, clip_shape;             // [per L] at most, against the target and the imported clip
+  double least_travel, most_travel;     // over the clip's own
+  double drift;                         // [per L a cycle] at most
+};
+constexpr Gate kGates[] = {
+    {"worm_crawl.glb", "loop", true, 4.99, 0.04, 0.04, 0.85, 1.15, 0.05},
+    {"boxdog_trot.fbx", "loop", true, 14.99, 0.02, 0.04, 0.92, 1.08, 0.005},
+    {"boxdog_jump.glb", "one_shot", true, 1, 0.04, 0.06, 0.75, 1.25, 0.2},
+};
+// Of the inverse dynamics, on every sample.
+constexpr double kMiss = 3e-4, kRootResidual = 0.01, kSaturated = 0.05;
+
+// Of a trace at the rate of the control.
+constexpr double kMomentum = 1e-6;       // [mg]
+constexpr double kAngularMomentum = 1e-3;  // [mgL]: the moment of gravity is taken at the row's middle
+constexpr double kContactMoment = 0.03;    // [mgL]: of the forces at the row's middle, between which the nodes shake
+constexpr double kPathMiss = 0.3;          // of the way: landing and standing shake within a row
+constexpr double kNearGround = 0.002;    // [per L]
+
+const std::map<std::string, std::set<std::string>> kReportGroups{
+    {"source", {"file", "sha256", "clip", "duration_s", "rate_hz", "scale", "root_motion"}},
+    {"body", {"nodes", "elements", "constraints", "vertices", "mass_kg", "length_m", "size_m", "youngs_modulus_pa"}},
+    {"coupling", {"error_rms_length"}},
+    {"preparation",
+     {"smooth_shift_rms_length", "foot_shift_rms_length", "volume_shift_rms_length", "momentum_shift_rms_length",
+      "missing_wrench_rms_mg", "missing_wrench_max_mg", "flight_s"}},
+    {"inverse", {"miss_rms_length", "root_residual_mg", "kkt_residual", "saturated", "max_strain", "p95_strain", "limit"}},
+    {"signals", {"kind", "period_s", "count", "harmonics", "error_rms_l0"}},
+    {"accuracy", {"method", "element", "dt_s", "estimated_error_length"}},
+    {"timing_s", {"total"}}};
+const std::set<std::string> kReplayKeys{
+    "cycles",           "duration_s",       "fell",           "fall_time_s",
+    "fall_cause",       "shape_rms_length", "world_rms_length", "drift_per_cycle_length",
+    "clip_shape_rms_length", "heading_deg_per_cycle", "travel_per_cycle_length", "clip_travel_per_cycle_length",
+    "slip_per_stance_length", "sole_gap_length", "penetration_max_size", "volume_error_max",
+    "momentum_residual_mg", "angular_residual_mgl", "external_assist_mg", "inverted_elements",
+    "guard_steps",      "correction_rms",   "real_time_factor"};
+
+void expect_contract(const fs::path& creature, bool stays_up) {
+  std::set<std::string> files{"creature.toml", "body.json", "target.bin", "signals.json", "reference.glb", "report.json", "report.html", "cache"};
+  files.insert(stays_up ? "replay.glb" : "failed.glb");
+  EXPECT_EQ(names_in(creature), files);
+  const json report = report_of(creature);
+  EXPECT_EQ(report.at("schema"), "hydrostat.report/1");
+  for (const auto& [group, keys] : kReportGroups) {
+    ASSERT_TRUE(report.contains(group)) << group;
+    for (const std::string& key : keys) {
+      EXPECT_TRUE(report[group].contains(key) && !report[group][key].is_null()) << group << "." << key;
+    }
+  }
+  for (const char* run : {"naive", "open_loop", "closed_loop"}) {
+    SCOPED_TRACE(run);
+    const json& figures = report.at("replay").at(run);
+    for (const std::string& key : kReplayKeys) EXPECT_TRUE(figures.contains(key)) << key;
+    EXPECT_EQ(figures.at("external_assist_mg"), 0);
+    EXPECT_EQ(figures.at("guard_steps"), 0);
+    EXPECT_LE(figures.at("momentum_residual_mg"), kMomentum);
+    EXPECT_LE(figures.at("angular_residual_mgl"), kMomentum);
+    EXPECT_EQ(figures.at("inverted_elements"), 0);
+  }
+  ASSERT_GE(report.at("effects").size(), 10U);
+  for (const json& effect : report["effects"]) {
+    SCOPED_TRACE(effect.dump());
+    EXPECT_TRUE(effect.at("state") == "on" || effect.at("state") == "off");
+    EXPECT_NE(effect.at("reason"), "");
+    EXPECT_TRUE(effect.at("state") == "on" || effect.at("ms_per_sim_s") == 0);
+  }
+  EXPECT_TRUE(report.at("warnings").is_array());
+  EXPECT_EQ(json::parse(io::read_file(creature / "body.json")).at("schema"), "hydrostat.body/1");
+  EXPECT_NE(io::read_file(creature / "creature.toml").find(report["source"]["sha256"].get<std::string>()), std::string::npos);
+}
+
+void expect_gate(const fs::path& creature, const Gate& gate) {
+  const json report = report_of(creature);
+  EXPECT_EQ(report["signals"]["kind"], gate.kind);
+  EXPECT_LE(report["signals"]["error_rms_l0"], 0.003);
+  EXPECT_LE(report["inverse"]["miss_rms_length"], kMiss);
+  EXPECT_LE(report["inverse"]["root_residual_mg"], kRootResidual);
+  EXPECT_LE(report["inverse"]["saturated"], kSaturated);
+  EXPECT_GT(report["preparation"]["min_jacobian"], 0);
+  EXPECT_EQ(report["body"]["pieces"], 1);
+  const json& run = report["replay"]["closed_loop"];
+  EXPECT_EQ(run["fell"], !gate.stays_up) << run["fall_cause"];
+  EXPECT_GE(run["cycles"], gate.cycles);
+  EXPECT_LE(run["shape_rms_length"], gate.shape);
+  EXPECT_LE(run["clip_shape_rms_length"], gate.clip_shape);
+  const double travel = run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>();
+  EXPECT_GE(travel, gate.least_travel);
+  EXPECT_LE(travel, gate.most_travel);
+  EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), gate.drift);
+}
+
+void expect_honest_trace(const fs::path& directory, const std::string& creature) {
+  hydrostat_in(directory, "replay " + in_quotes(creature) + " --quiet --duration 2 -o motion.glb --trace trace");
+  const TraceAudit audit = audit_trace(directory / "trace", directory / creature);
+  const double length = report_of(directory / creature)["body"]["length_m"];
+  EXPECT_NEAR(audit.slowest_row_s, 1.0 / 120, 1e-9);
+  EXPECT_NEAR(audit.fastest_row_s, 1.0 / 120, 1e-9);
+  EXPECT_LE(audit.path_miss, kPathMiss);
+  EXPECT_LE(audit.com_path_miss, 1);
+  EXPECT_LE(audit.momentum_mg, kMomentum);
+  EXPECT_LE(audit.angular_mgl, kAngularMomentum);
+  EXPECT_LE(audit.moment_mgl, kContactMoment);
+  EXPECT_LE(audit.cone_excess_mg, 1e-9);
+  EXPECT_LE(audit.pull_mg, 1e-12);
+  EXPECT_LE(audit.loaded_height_m, kNearGround * length);
+  EXPECT_EQ(audit.effect_mg, 0);
+  EXPECT_EQ(audit.correction_ns, 0);
+}
+
+void expect_sample(const Gate& gate) {
+  SCOPED_TRACE(gate.clip);
+  const TemporaryDirectory directory;
+  const Outcome outcome = convert(directory.path, gate.clip, "creature");
+  EXPECT_EQ(outcome.exit_code, gate.stays_up ? 0 : 3) << outcome.err;
+  ASSERT_TRUE(fs::exists(directory.path / "creature"));
+  expect_contract(directory.path / "creature", gate.stays_up);
+  expect_gate(directory.path / "creature", gate);
+  expect_honest_trace(directory.path, "creature");
+}
+
+TEST(Convert, LetsTheWormCrawlByItself) { expect_sample(kGates[0]); }
+TEST(Convert, LetsTheDogTrotByItself) { expect_sample(kGates[1]); }
+TEST(Convert, LetsTheDogJumpByItself) { expect_sample(kGates[2]); }
+
+TEST(Convert, GivesTheSameBytesForAnyNumberOfThreads) {
+  const TemporaryDirectory directory;
+  convert(directory.path, kSmallClip, "one", std::string(kSmallOptions) + "--threads 1");
+  convert(directory.path, kSmallClip, "two", std::string(kSmallOptions) + "--threads 2");
+  const fs::path one = directory.path / "one", two = directory.path / "two";
+  ASSERT_EQ(names_in(one), names_in(two));
+  for (const char* name : {"signals.json", "reference.glb", "body.json", "target.bin", "creature.toml"}) {
+    EXPECT_EQ(io::read_file(one / name), io::read_file(two / name)) << name;
+  }
+  EXPECT_EQ(motion_bytes(one), motion_bytes(two));
+}
+
+/// Which entries of the stage cache are the same in both.
+std::set<std::string> stages_kept(const std::set<std::string>& before, const std::set<std::string>& after) {
+  std::set<std::string> kept;
+  for (const std::string& entry : before) {
+    if (after.contains(entry)) kept.insert(entry.substr(0, entry.find('-')));
+  }
+  return kept;
+}
+
+TEST(Convert, RedoesOnlyWhatAChangedOptionReaches) {
+  const TemporaryDirectory directory;
+  const fs::path cache = directory.path / "creature" / "cache";
+  const std::string options = kSmallOptions;
+  using Stages = std::set<std::string>;
+  convert(directory.path, kSmallClip, "creature", options);
+  const std::set<std::string> first = names_in(cache);
+  EXPECT_EQ(stages_kept(first, first), (Stages{"body", "coupling", "preparation", "inverse_dynamics", "replay"}));
+  const std::string motion = motion_bytes(directory.path / "creature");
+  const double solving = report_of(directory.path / "creature")["timing_s"]["inverse_dynamics"];
+
+  convert(directory.path, kSmallClip, "creature", options);
+  EXPECT_EQ(names_in(cache), first);
+  EXPECT_EQ(motion_bytes(directory.path / "creature"), motion);
+  EXPECT_LT(report_of(directory.path / "creature")["timing_s"]["inverse_dynamics"], 0.5 * solving);
+
+  convert(directory.path, kSmallClip, "creature", options + "--limit 0.15");
+  const std::set<std::string> limited = names_in(cache);
+  EXPECT_EQ(stages_kept(first, limited), (Stages{"body", "coupling", "preparation"}));
+
+  convert(directory.path, kSmallClip, "creature", options + "--limit 0.15 --seed 3");
+  const std::set<std::string> seeded = names_in(cache);
+  EXPECT_EQ(stages_kept(limited, seeded), (Stages{"body", "coupling", "preparation", "inverse_dynamics"}));
+
+  convert(directory.path, kSmallClip, "creature", options + "--limit 0.15 --friction 0.7");
+  EXPECT_EQ(stages_kept(seeded, names_in(cache)), (Stages{"body", "coupling"}));
+
+  convert(directory.path, kSmallClip, "afresh", options + "--limit 0.15 --friction 0.7");
+  EXPECT_EQ(motion_bytes(directory.path / "creature"), motion_bytes(directory.path / "afresh"));
+}
+
+TEST(Convert, MarksACreatureThatFalls) {
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "creature";
+  const std::string smooth_ground = std::string(kSmallOptions) + "--friction 0.05";
+  convert(directory.path, kSmallClip, "creature", kSmallOptions);
+  std::ofstream(creature / "replay.glb") << "of an earlier run that stayed up";
+  std::ofstream(creature / "notes.txt") << "the user's own";
+  const Outcome outcome = convert(directory.path, kSmallClip, "creature", smooth_ground);
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err.find("creature: replay: the creature fell: at "), 0U) << outcome.err;
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1);
+  EXPECT_TRUE(fs::exists(creature / "failed.glb"));
+  EXPECT_FALSE(fs::exists(creature / "replay.glb"));
+  EXPECT_TRUE(fs::exists(creature / "notes.txt"));
+  const json run = report_of(creature)["replay"]["closed_loop"];
+  EXPECT_EQ(report_of(creature)["outcome_ok"], false);
+  EXPECT_EQ(run["fell"], true);
+  EXPECT_GT(run["fall_time_s"], 0);
+  EXPECT_NE(run["fall_cause"].get<std::string>().find("limb '"), std::string::npos);
+}
+
+TEST(Convert, KeepsTheLayersOfASignalFile) {
+  const TemporaryDirectory directory;
+  convert(directory.path, kSmallClip, "creature", kSmallOptions);
+  hydrostat_in(directory.path, "signals creature gain --bone 'head*' --factor 0.5 --name softer");
+  convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--limit 0.15");
+  EXPECT_NE(hydrostat_in(directory.path, "signals creature layers").out.find("'softer'"), std::string::npos);
+}
+
+TEST(Convert, LetsAnotherBodyGoForEachSeed) {
+  const TemporaryDirectory directory;
+  const auto made = [&](const std::string& seed) {
+    convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--seed " + seed);
+    return motion_bytes(directory.path / "creature");
+  };
+  const std::string planned = made("0"), first = made("1"), second = made("2");
+  EXPECT_NE(planned, first);
+  EXPECT_NE(first, second);
+  EXPECT_EQ(made("1"), first);
+  const std::string warnings = report_of(directory.path / "creature")["warnings"].dump();
+  EXPECT_NE(warnings.find("--seed 1: the body that was let go has"), std::string::npos) << warnings;
+}
+
+TEST(Convert, PrintsTheReportForMachines) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--json");
+  EXPECT_EQ(outcome.out, io::read_file(directory.path / "creature" / "report.json"));
+}
+
+TEST(Convert, RefusesBadInputInOneLineAndLeavesNothing) {
+  const TemporaryDirectory directory;
+  std::ofstream(directory.path / "text.fbx") << "this is no clip\n";
+  std::ofstream(directory.path / "file") << "not a directory\n";
+  fs::create_directory(directory.path / "mine");
+  std::ofstream(directory.path / "mine" / "letter.txt") << "not a creature\n";
+  const std::set<std::string> before = names_in(directory.path);
+  const std::string trot = in_quotes(fs::path(HYDROSTAT_SAMPLES) / "boxdog_trot.fbx");
+  const auto expect = [&](const std::string& arguments, int exit_code, const std::string& told) {
+    SCOPED_TRACE(arguments);
+    const Outcome outcome = hydrostat_in(directory.path, "convert --quiet " + arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_NE(outcome.err.find(told), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_EQ(names_in(directory.path), before);
+  };
+  expect("missing.fbx -o out", 1, "missing.fbx: ");
+  expect("text.fbx -o out", 1, "text.fbx: ");
+  expect(trot + " -o out --clip Fly", 1, "clip 'Fly': there is no such clip. Choose one of: 0 'Scene'.");
+  expect(trot + " -o file", 1, "file: is a file where a creature's directory belongs.");
+  expect(trot + " -o mine", 1, "mine: ");
+  expect(trot + " -o /proc/out", 1, "/proc/out: the directory cannot be written");
+  expect(trot, 2, "--out is required");
+  expect(trot + " -o out --height 0", 2, "option --height: Value 0 not in range 0.01 to 1000.");
+  expect(trot + " -o out --height nan", 2, "option --height: Value nan not in range 0.01 to 1000.");
+  expect(trot + " -o out --nodes 5", 2, "option --nodes: Value 5 not in range 20 to 5000.");
+  expect(trot + " -o out --nodes 40.5", 2, "option --nodes: '40.5' is not a whole number");
+  expect(trot + " -o out --limit 2", 2, "option --limit: Value 2 not in range 0.01 to 0.9.");
+  expect(trot + " -o out --limit most", 2, "option --limit: Value most not in range 0.01 to 0.9.");
+  expect(trot + " -o out --friction -1", 2, "option --friction: Value -1 not in range 0.05 to 5.");
+  expect(trot + " -o out --threads 0", 2, "option --threads: Value 0 not in range 1 to 256.");
+  expect(trot + " -o out --method magic", 2, "option --method: magic not in");
+  expect(trot + " -o out --root-motion sideways", 2, "option --root-motion: sideways not in");
+}
+
+TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {
+  const TemporaryDirectory directory;
+  convert(directory.path, kSmallClip, "creature", kSmallOptions);
+  const fs::path creature = directory.path / "creature";
+  const std::set<std::string> files = names_in(creature), cache = names_in(creature / "cache");
+  const std::string report = io::read_file(creature / "report.json"), signals = io::read_file(creature / "signals.json");
+  // No file may grow beyond 64 blocks of 512 or 1024 bytes: as a full disk, to write(2).
+  const Outcome outcome =
+      hydrostat_in(directory.path, "--version && ulimit -f 64 && " + in_quotes(HYDROSTAT_BINARY) + " convert " +
+                                       in_quotes(fs::path(HYDROSTAT_SAMPLES) / kSmallClip) + " -o creature --quiet --nodes 60 2>message");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(io::read_file(directory.path / "message").find("creature/cache/body-"), 0U) << io::read_file(directory.path / "message");
+  EXPECT_EQ(names_in(creature), files);
+  EXPECT_EQ(names_in(creature / "cache"), cache);
+  EXPECT_EQ(io::read_file(creature / "report.json"), report);
+  EXPECT_EQ(io::read_file(creature / "signals.json"), signals);
+  EXPECT_EQ(names_in(directory.path), (std::set<std::string>{"creature", "message"}));
+}
+
+}  // namespace
+}  // namespace hydrostat

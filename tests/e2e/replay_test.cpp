@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include "tests/e2e/made_creature.h"
+#include "tests/e2e/trace_audit.h"
+
+namespace hydrostat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A small creature, made anew for each test.
+class Replay : public testing::Test {
+ protected:
+  void SetUp() override {
+    convert(directory_.path, kSmallClip, "creature", kSmallOptions);
+    ASSERT_TRUE(fs::exists(creature_ / "body.json"));
+  }
+  Outcome replay(const std::string& options) const { return hydrostat_in(directory_.path, "replay creature --quiet " + options); }
+  TraceAudit traced(const std::string& options) const {
+    replay("-o motion.glb --trace trace " + options);
+    return audit_trace(directory_.path / "trace", creature_);
+  }
+
+  TemporaryDirectory directory_;
+  fs::path creature_ = directory_.path / "creature";
+};
+
+TEST_F(Replay, IsTheConversionsOwnAndNeedsNoCache) {
+  const std::string motion = motion_bytes(creature_);
+  const nlohmann::json before = report_of(creature_);
+  fs::remove_all(creature_ / "cache");
+  replay("");
+  EXPECT_EQ(motion_bytes(creature_), motion);
+  const nlohmann::json after = report_of(creature_);
+  for (const char* group : {"source", "body", "coupling", "preparation", "inverse", "signals", "warnings"}) {
+    EXPECT_EQ(after[group], before[group]) << group;
+  }
+  EXPECT_EQ(after["replay"]["closed_loop"]["cycles"], before["replay"]["closed_loop"]["cycles"]);
+}
+
+TEST_F(Replay, PlaysTheLayersOfTheSignals) {
+  const std::string motion = motion_bytes(creature_);
+  hydrostat_in(directory_.path, "signals creature gain --bone '*' --factor 0.7");
+  replay("");
+  EXPECT_NE(motion_bytes(creature_), motion);
+  hydrostat_in(directory_.path, "signals creature reset");
+  replay("");
+  EXPECT_EQ(motion_bytes(creature_), motion);
+}
+
+TEST_F(Replay, WithAFileOfItsOwnLeavesTheCreatureAlone) {
+  const std::string motion = motion_bytes(creature_), report = io::read_file(creature_ / "report.json");
+  const std::set<std::string> files = names_in(creature_);
+  const Outcome outcome = replay("--cycles 1 -o one.glb");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(fs::exists(directory_.path / "one.glb"));
+  EXPECT_EQ(motion_bytes(creature_), motion);
+  EXPECT_EQ(io::read_file(creature_ / "report.json"), report);
+  EXPECT_EQ(names_in(creature_), files);
+}
+
+TEST_F(Replay, RunsForAsLongAsAsked) {
+  replay("--cycles 2");
+  EXPECT_NEAR(report_of(creature_)["replay"]["closed_loop"]["cycles"].get<double>(), 2, 1e-9);
+  replay("--duration 0.5");
+  EXPECT_NEAR(report_of(creature_)["replay"]["closed_loop"]["duration_s"].get<double>(), 0.5, 1e-9);
+}
+
+TEST_F(Replay, WithoutTheCorrectorHasNoClosedLoop) {
+  replay("--cycles 1 --open-loop");
+  const nlohmann::json runs = report_of(creature_)["replay"];
+  EXPECT_TRUE(runs["closed_loop"].is_null());
+  EXPECT_EQ(runs["open_loop"]["correction_rms"], 0);
+  EXPECT_NEAR(runs["open_loop"]["cycles"].get<double>(), 1, 1e-9);
+}
+
+TEST_F(Replay, PushesByAForceThatTheTraceTells) {
+  const TraceAudit audit = traced("--duration 1 --push t=0.5,dv=0.2:0:0");
+  EXPECT_NEAR(audit.effect_mg, 0.2 / 0.1 / 9.81, 1e-9);
+  EXPECT_LE(audit.momentum_mg, 1e-6);
+  EXPECT_EQ(audit.correction_ns, 0);
+}
+
+TEST_F(Replay, TracesTheMeansOverLongerRows) {
+  const TraceAudit fine = traced("--duration 1"), coarse = traced("--duration 1 --trace-rate 30");
+  EXPECT_NEAR(coarse.fastest_row_s, 1.0 / 30, 1e-9);
+  EXPECT_NEAR(coarse.slowest_row_s, 1.0 / 30, 1e-9);
+  EXPECT_NEAR(coarse.duration_s, fine.duration_s, 1e-9);
+  EXPECT_LE(fine.momentum_mg, 1e-6);
+  EXPECT_LE(coarse.momentum_mg, 1e-6);
+  EXPECT_LE(coarse.cone_excess_mg, 1e-9);
+  EXPECT_LT(fine.path_miss, 0.7 * coarse.path_miss);  // positions follow velocities the better the shorter the rows
+}
+
+TEST_F(Replay, RefusesWhatItCannotDo) {
+  const auto expect = [&](const std::string& options, int exit_code, const std::string& told) {
+    SCOPED_TRACE(options);
+    const Outcome outcome = replay(options);
+    EXPECT_EQ(outcome.exit_code, exit_code);
+    EXPECT_NE(outcome.err.find(told), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  };
+  const std::string motion = motion_bytes(creature_);
+  expect("--duration 0", 2, "option --duration: Value 0 not in range 0.1 to 600.");
+  expect("--duration 1 --cycles 1", 2, "excludes");
+  expect("--push t=1", 2, "option --push: 't=1' lacks dv.");
+  expect("--push dv=1:0:0", 2, "option --push: 'dv=1:0:0' lacks t.");
+  expect("--push t=1,dv=1:0", 2, "has not three speeds in dv.");
+  expect("--push t=1,dv=1:0:x", 2, "option --push dv: Value x not in range -100 to 100.");
+  expect("--push t=99,dv=1:0:0", 2, "comes after the end of the replay.");
+  expect("--trace-rate 60", 2, "--trace-rate requires --trace.");
+  expect("--trace trace --trace-rate 70", 2, "option --trace-rate: 70 Hz is not a whole part of the 120 Hz");
+  expect("--trace trace --trace-rate 240", 2, "option --trace-rate: 240 Hz is not a whole part of the 120 Hz");
+  expect("-o motion.fbx", 2, "option --out: 'motion.fbx' does not end with .glb.");
+  expect("-o missing/../motion.glb --trace creature --duration 0.1", 1, "creature: ");
+  EXPECT_EQ(motion_bytes(creature_), motion);
+
+  std::ofstream(creature_ / "signals.json") << "{}";
+  expect("--duration 0.1", 1, "signals.json: ");
+  fs::remove(creature_ / "target.bin");
+  expect("--duration 0.1", 1, "target.bin: ");
+  fs::remove(creature_ / "creature.toml");
+  expect("--duration 0.1", 1, "creature: is no creature. Make one with 'hydrostat convert'.");
+}
+
+TEST_F(Replay, RefusesABodyThatIsNotItsOwn) {
+  const std::string body = io::read_file(creature_ / "body.json");
+  const auto expect = [&](const std::string& broken, const std::string& told) {
+    std::ofstream(creature_ / "body.json") << broken;
+    const Outcome outcome = replay("--duration 0.1");
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.err.find("body.json: " + told), std::string::npos) << outcome.err;
+  };
+  expect("not JSON", "");
+  nlohmann::json json = nlohmann::json::parse(body);
+  const auto changed = [&](const char* key, const nlohmann::json& value) {
+    nlohmann::json copy = json;
+    copy[key] = value;
+    return copy.dump();
+  };
+  expect(changed("schema", "hydrostat.body/9"), "'schema': ");
+  expect(changed("mass_kg", {1, 2}), "'mass_kg': has 2 entries where ");
+  expect(changed("tets", {{0, 1, 2, 100000}}), "'tets': points at something that does not exist.");
+  expect(changed("tets", {{0, 1, 2}}), "'tets', entry 0: has not 4 numbers.");
+  expect(changed("edges", {{0, 1}}), "");
+  expect(changed("length_m", -1), "'length_m': is no number above 0.");
+}
+
+}  // namespace
+}  // namespace hydrostat

@@ -1,0 +1,67 @@
+#include "io/stage_records.h"
+
+#include <gtest/gtest.h>
+
+#include "retarget/error.h"
+#include "tests/retarget/box_performer.h"
+
+namespace hydrostat::io {
+namespace {
+
+TEST(StageRecords, GivePerformancesBackToTheBit) {
+  const retarget::Performer performer = retarget::make_box_performer();
+  retarget::PerformOptions options;
+  options.replay.duration_s = 0.1;
+  options.baselines = false;
+  const retarget::Performances runs = retarget::perform(performer, retarget::signals_of(performer), options);
+  const auto read = result_of<retarget::Performances>(record_of(runs));
+  EXPECT_FALSE(read.naive || read.open_loop);
+  ASSERT_TRUE(read.closed_loop);
+  EXPECT_EQ(read.closed_loop->motion.frames, runs.closed_loop->motion.frames);
+  EXPECT_EQ(read.closed_loop->course.com, runs.closed_loop->course.com);
+  EXPECT_EQ(read.closed_loop->course.patch_state, runs.closed_loop->course.patch_state);
+  EXPECT_EQ(packed(record_of(read), "", ""), packed(record_of(runs), "", ""));
+}
+
+TEST(StageRecords, GiveACharacterBackToTheBit) {
+  const retarget::BoxCreature box = retarget::make_box_creature();
+  ImportedCharacter imported;
+  imported.character.skeleton = box.skeleton;
+  imported.character.skin.vertices = box.scene.body.rest;
+  imported.character.skin.skin_weights.assign(static_cast<std::size_t>(box.scene.body.node_count()), {{0, 0.25}, {3, 0.75}});
+  imported.character.clip.name = "Walk";
+  imported.character.clip.bone_pose.assign(3, box.skeleton.bind_pose);
+  imported.warnings = {"one", "another"};
+  const auto read = result_of<ImportedCharacter>(record_of(imported));
+  EXPECT_EQ(read.warnings, imported.warnings);
+  EXPECT_EQ(read.character.skeleton.names, imported.character.skeleton.names);
+  EXPECT_EQ(read.character.skeleton.weighted, imported.character.skeleton.weighted);
+  EXPECT_EQ(read.character.skin.skin_weights[5][1].bone, 3);
+  EXPECT_EQ(read.character.skin.skin_weights[5][1].weight, 0.75);
+  EXPECT_EQ(read.character.clip.bone_pose[2][4].matrix(), imported.character.clip.bone_pose[2][4].matrix());
+  EXPECT_EQ(packed(record_of(read), "", ""), packed(record_of(imported), "", ""));
+}
+
+TEST(TargetFile, ComesBackWholeOrNotAtAll) {
+  PerformedTarget target;
+  target.performer = retarget::make_box_performer();
+  target.report.source.clip = "Walk";
+  target.report.warnings = {"told"};
+  const std::string bytes = target_bytes(target);
+  const PerformedTarget read = parse_target(bytes, "target.bin");
+  EXPECT_EQ(read.performer.prepared.target.frames, target.performer.prepared.target.frames);
+  EXPECT_EQ(read.performer.prepared.contacts.state, target.performer.prepared.contacts.state);
+  EXPECT_EQ(read.performer.muscles.fields, target.performer.muscles.fields);
+  EXPECT_EQ(read.report.source.clip, "Walk");
+  EXPECT_EQ(read.report.warnings, target.report.warnings);
+  EXPECT_EQ(target_bytes(read), bytes);
+  for (const std::size_t place : {std::size_t{3}, bytes.size() / 2, bytes.size() - 1}) {
+    std::string damaged = bytes;
+    damaged[place] = static_cast<char>(damaged[place] ^ 1);
+    EXPECT_THROW(parse_target(damaged, "target.bin"), Error);
+    EXPECT_THROW(parse_target(bytes.substr(0, place), "target.bin"), Error);
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::io

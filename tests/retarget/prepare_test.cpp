@@ -205,17 +205,24 @@ TEST(Prepare, TellsTheForceThatIsMissingInTheAir) {
   }
 }
 
-TEST(Prepare, TellsWhatABodyThatLeansOutsideItsFeetLacks) {
-  // It stands on its front feet alone, a quarter of a metre before its centre of mass, and the back feet are held up.
+TEST(Prepare, LeansABodyOverTheFeetItStandsOn) {
+  // It stands on its front feet alone, a fifth of a metre before its centre of mass, and the back feet are held up.
   const BoxCreature creature = make_box_creature();
   const Motion motion = played(creature, 24, true, [](const Eigen::Vector3d& x, Eigen::Index) {
     return Eigen::Vector3d(x + Eigen::Vector3d(0, x.x() < 0.15 && x.y() < 0.05 ? 0.05 : 0, 0));
   });
-  PrepareOptions options;
-  options.momentum = false;
-  const PreparedTarget target = prepared(creature, motion, options);
-  ASSERT_EQ(target.contacts.patches.size(), 2u);
-  EXPECT_GT(target.missing_wrench.bottomRows<3>().cwiseAbs().maxCoeff() + target.report.missing_wrench_max_mg, 0.1);
+  PrepareOptions as_it_is, balanced;
+  as_it_is.momentum = false;
+  const PreparedTarget given = prepared(creature, motion, as_it_is), target = prepared(creature, motion, balanced);
+  ASSERT_EQ(given.contacts.patches.size(), 2u);
+  const auto lacks = [](const PreparedTarget& prepared_target) { return prepared_target.missing_wrench.colwise().norm().maxCoeff(); };
+  const auto com_x = [&](const PreparedTarget& prepared_target) {
+    return physics::centre_of_mass(creature.scene.body, prepared_target.target.at(12)).x();
+  };
+  EXPECT_GT(lacks(given), 0.1);  // told, not hidden
+  EXPECT_LT(com_x(given), 0.3);
+  EXPECT_GT(com_x(target), 0.39);  // the heels of the front feet are at 0.4
+  EXPECT_LT(lacks(target), 0.1 * lacks(given));
 }
 
 TEST(Prepare, ABodyThatNeverTouchesLacksItsWholeWeight) {

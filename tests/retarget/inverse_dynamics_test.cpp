@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <cmath>
 #include <string>
 
@@ -173,6 +174,49 @@ TEST(InverseDynamics, WishForTheKinematicActivation) {
     wish[e] = (motion.at(1).col(body.edges(0, e)) - motion.at(1).col(body.edges(1, e))).norm() / body.rest_length[e];
   }
   EXPECT_GT((wish.array() - 1).matrix().norm(), 5 * (upright - wish).norm());
+}
+
+TEST(InverseDynamics, LeaveTheirWishAsLittleAsBalanceNeeds) {
+  // Where no bound holds and nothing smooths, what u differs from its wish is orthogonal to every self-stress: B d = 0 makes no force.
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = bobbing(creature, 8, 0.05);
+  InverseOptions options;
+  options.smooth_weight = 0;
+  options.limit = 0.6;
+  const InverseDynamics inverse = solve_standing(creature, motion, options);
+  ASSERT_EQ(inverse.report.saturated, 0);
+  const physics::Body& body = creature.scene.body;
+  for (const Eigen::Index f : {1, 4, 6}) {
+    Eigen::MatrixXd force = Eigen::MatrixXd::Zero(3 * body.node_count(), body.edge_count());
+    Eigen::VectorXd away(body.edge_count());
+    for (int e = 0; e < body.edge_count(); ++e) {
+      const Eigen::Vector3d along = motion.at(f).col(body.edges(1, e)) - motion.at(f).col(body.edges(0, e));
+      const Eigen::Vector3d push = body.edge_stiffness[e] * body.rest_length[e] * along.normalized();
+      force.col(e).segment<3>(3 * body.edges(1, e)) = push;
+      force.col(e).segment<3>(3 * body.edges(0, e)) = -push;
+      away[e] = inverse.activation(e, f) - along.norm() / body.rest_length[e];
+    }
+    const Eigen::VectorXd needed = force.completeOrthogonalDecomposition().solve(force * away);
+    EXPECT_LT((away - needed).norm(), 1e-3 * away.norm()) << "frame " << f;
+  }
+}
+
+TEST(InverseDynamics, MoreWeightOnTheShapeIsPaidWithMiss) {
+  // A shape that is 3 % too large, which its wish alone does not hold.
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = played(creature, 3, true, [](const Eigen::Vector3d& x, Eigen::Index) { return Eigen::Vector3d(x.x(), 1.03 * x.y(), x.z()); });
+  double last = 0;
+  for (const double weight : {0.001, 0.1, 10.0, 1000.0}) {
+    InverseOptions options;
+    options.shape_weight = weight;
+    options.smooth_weight = 0;
+    const double miss = solve_standing(creature, motion, options).report.miss_rms_length;
+    EXPECT_GT(miss, 2 * last);
+    if (weight == 0.1) {
+      EXPECT_LT(miss, 2e-6);
+    }
+    last = miss;
+  }
 }
 
 TEST(AutomaticLimit, IsThe99thPercentileWithinItsBounds) {

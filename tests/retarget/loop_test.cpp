@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <string>
 
@@ -91,6 +92,26 @@ TEST(CloseLoop, TakesAFewFramesForNoLoop) {
   Motion short_clip;
   short_clip.frames = Eigen::MatrixXd::Zero(3, 4);
   EXPECT_FALSE(close_loop(short_clip, Eigen::VectorXd::Ones(1), 1).loop);
+}
+
+/// A body of two points that leaves the ground for the middle of its 60 frames, from rest or at a run.
+Motion leap(double rise, bool from_rest) {
+  Motion motion;
+  motion.frames = Eigen::MatrixXd::Zero(6, 60);
+  for (int f = 0; f < 60; ++f) {
+    const double share = f / 59.0, eased = from_rest ? share - std::sin(2 * M_PI * share) / (2 * M_PI) : share;
+    const double height = rise * std::pow(std::sin(M_PI * share), 4);
+    motion.frames.col(f) << eased, height, 0, eased, height + 0.2, 0;
+  }
+  return motion;
+}
+
+TEST(PlayedOnce, IsALeapFromRestToRest) {
+  const Eigen::VectorXd mass = Eigen::VectorXd::Ones(2);
+  EXPECT_TRUE(was_made_to_be_played_once(leap(0.3, true), mass, 0.05));
+  EXPECT_FALSE(was_made_to_be_played_once(leap(0.3, false), mass, 0.05)) << "it runs on";
+  EXPECT_FALSE(was_made_to_be_played_once(leap(0.02, true), mass, 0.05)) << "it never leaves the ground";
+  EXPECT_FALSE(was_made_to_be_played_once(leap(0, false), mass, 0.05));
 }
 
 }  // namespace

@@ -1,0 +1,90 @@
+#include "retarget/creature.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/retarget/shapes.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+/// A block of 1 x 0.4 x 0.5 m on one bone that goes along `travel` [m] in `frames` frames at 60 Hz, `lift` [m] above the ground.
+Character block(double scale, const Eigen::Vector3d& travel, int frames, double lift = 0) {
+  Character character;
+  character.skeleton = one_bone();
+  character.skin = box_skin({0, 0, 0}, Eigen::Vector3d(1, 0.4, 0.5) * scale, 0, 8);
+  character.clip.rate_hz = character.clip.key_rate_hz = 60;
+  character.clip.duration_s = character.clip.range_s = (frames - 1) / 60.0;
+  for (int f = 0; f < frames; ++f) {
+    const Eigen::Vector3d place = scale * (Eigen::Vector3d(0, lift, 0) + travel * (static_cast<double>(f) / (frames - 1)));
+    character.clip.bone_pose.push_back({Eigen::Affine3d(Eigen::Translation3d(place))});
+  }
+  return character;
+}
+
+double extent(const Eigen::Matrix3Xd& points, int axis) { return points.row(axis).maxCoeff() - points.row(axis).minCoeff(); }
+
+TEST(MakeCreature, KeepsASizeThatIsACreatures) {
+  const Creature creature = make_creature(block(1, {0, 0, 0}, 6), {});
+  EXPECT_EQ(creature.scale, 1);
+  EXPECT_TRUE(creature.warnings.empty());
+  EXPECT_NEAR(creature.length, 1, 1e-12);
+  EXPECT_NEAR(creature.scene.body.mass.sum(), 200, 10);  // [kg] water of 0.2 m3
+  EXPECT_NEAR(creature.size, std::cbrt(0.2), 0.02);
+  EXPECT_NEAR(creature.youngs_modulus, 1000 * 9.81 * 1 / 0.005, 1);  // rho g L over softness
+  EXPECT_EQ(bones_of(creature.contacts).size(), static_cast<std::size_t>(creature.scene.contact_points.count()));
+}
+
+TEST(MakeCreature, BringsAHouseOrACrumbToOneMetreAndSaysSo) {
+  for (const double scale : {141.0, 0.003}) {
+    SCOPED_TRACE("scale " + std::to_string(scale));
+    const Creature creature = make_creature(block(scale, {0.5, 0, 0}, 6), {});
+    EXPECT_NEAR(creature.length, 1, 1e-9);
+    EXPECT_NEAR(creature.scale * scale, 1, 1e-9);
+    ASSERT_EQ(creature.warnings.size(), 1u);
+    EXPECT_NE(creature.warnings[0].find("--height"), std::string::npos);
+    EXPECT_NEAR(extent(creature.character.skin.vertices, 0), 1, 1e-9);
+    EXPECT_NEAR(creature.character.clip.bone_pose.back()[0].translation().x(), 0.5, 1e-9);  // its way as well
+  }
+}
+
+TEST(MakeCreature, HeightDecides) {
+  CreatureOptions options;
+  options.height_m = 2;
+  const Creature creature = make_creature(block(141, {0, 0, 0}, 6), options);
+  EXPECT_NEAR(extent(creature.character.skin.vertices, 1), 2, 1e-9);
+  EXPECT_NEAR(creature.length, 5, 1e-9);
+  EXPECT_TRUE(creature.warnings.empty());
+}
+
+TEST(ImportMotion, StandsOnTheGroundWhateverTheClipsHeight) {
+  for (const double lift : {-0.7, 0.0, 3.0}) {
+    const Creature creature = make_creature(block(1, {0, 0, 0}, 8, lift), {});
+    const ImportedMotion motion = import_motion(creature, {});
+    EXPECT_NEAR(ground_height(motion.skin_points), 0, 1e-9);
+    EXPECT_TRUE(motion.nodes.loop);
+    EXPECT_EQ(motion.nodes.count(), 7);  // the last frame repeats the first
+  }
+}
+
+TEST(ImportMotion, KeepsTheTravelOfNodesAndSkinTogether) {
+  const Creature creature = make_creature(block(1, {0.6, 0, -0.3}, 13), {});
+  for (const RootMotion mode : {RootMotion::kAuto, RootMotion::kNone}) {
+    CreatureOptions options;
+    options.root_motion = mode;
+    const ImportedMotion motion = import_motion(creature, options);
+    const Eigen::Vector3d expected = mode == RootMotion::kNone ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(0.6, 0, -0.3);
+    EXPECT_LT((motion.nodes.travel - expected).norm(), 1e-9);
+    EXPECT_EQ(motion.nodes.travel, motion.skin_points.travel);
+    EXPECT_EQ(motion.root_motion, mode == RootMotion::kNone ? "none" : "clip");
+    const Motion carried = point_motion(creature.scene.contact_points, motion.nodes);
+    for (Eigen::Index f = 0; f < carried.count(); ++f) {
+      EXPECT_LT((carried.at(f) - motion.skin_points.at(f)).colwise().norm().maxCoeff(), 0.01) << "frame " << f;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

@@ -213,7 +213,7 @@ class Conversion {
     key_ = key_after(key_, options_.friction);
     retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] {
       return retarget::prepare(motion_.nodes, scene, retarget::bones_of(creature_.contacts), creature_.character.skeleton.names,
-                               creature_.mesh.bone_weights, creature_.length, creature_.size, {});
+                               creature_.mesh.bone_weights, creature_.length, creature_.size, retarget::prepare_options(motion_));
     });
     retarget::InverseOptions inverse_options;
     inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);

@@ -13,6 +13,7 @@ constexpr double kLargest = 30, kSmallest = 0.01;  // [m] of a creature's longes
 constexpr double kSkinRate = 30;                   // [Hz] that will do to look at
 constexpr double kLoopTolerance = 0.02;            // of L
 constexpr double kRecoveredStillSpeed = 0.6;       // of the RMS speed: the pace of a clip in place is known that well
+constexpr const char* kFromFeet = "from feet";
 constexpr double kOwnTravel = 0.05;                // of L: less is a clip in place, which is there to be repeated
 constexpr double kFlight = 0.05;                   // of D above the ground
 
@@ -57,7 +58,7 @@ Motion skin_motion(const Character& character, const Motion& loop, const RootMot
 
 PrepareOptions prepare_options(const ImportedMotion& imported) {
   PrepareOptions options;
-  if (imported.travel_recovered) options.contacts.still_speed = kRecoveredStillSpeed;
+  if (imported.root_motion == kFromFeet) options.contacts.still_speed = kRecoveredStillSpeed;
   return options;
 }
 
@@ -121,8 +122,7 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   Motion skin_points = both;
   skin_points.frames = both.frames.bottomRows(3 * points);
   const RootMotionResult root = recover_root_motion(skin_points, creature.length, options.root_motion);
-  result.travel_recovered = root.recovered;
-  result.root_motion = root.recovered ? "from feet" : options.root_motion == RootMotion::kNone ? "none" : "clip";
+  result.root_motion = root.recovered ? kFromFeet : options.root_motion == RootMotion::kNone ? "none" : "clip";
   const Motion loop = both;
   for (Eigen::Index f = 0; f < both.count(); ++f) {
     for (Eigen::Index i = 0; i < nodes + points; ++i) both.frames.col(f).segment<3>(3 * i) += root.offset.col(f);

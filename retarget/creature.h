@@ -51,7 +51,6 @@ struct ImportedMotion {
   Motion skin_points;          // the contact points' vertices as the clip has them, 3P x F
   Motion skin;                 // all of its vertices likewise, at 30 Hz where the frames allow, 3V x F
   CouplingReport coupling;
-  bool travel_recovered = false;
   std::string root_motion;     // "clip", "from feet" or "none"
   std::vector<std::string> warnings;
 };

@@ -146,7 +146,6 @@ void solve_frame(Frame& frame, const Eigen::VectorXd& wish, double weight_per_ed
   const BoundedSolution solution = solve(frame.problem, frame.solution);
   frame.solution = solution.x;
   frame.kkt_residual = solution.kkt_residual;
-  if (getenv("HYDBG")) fprintf(stderr,"pivots %d\n",solution.pivots);
 }
 
 }  // namespace

@@ -397,7 +397,6 @@ ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, co
     badness.push_back(std::sqrt(shift.missing_wrench.topRows<3>().squaredNorm() / frames) +
                       std::sqrt(shift.missing_wrench.bottomRows<3>().squaredNorm() / frames) +
                       std::sqrt(shift.move.squaredNorm() / frames) / length);
-    if (getenv("HYDBG")) fprintf(stderr,"height %g bad %g\n",factor,badness.back());
     if (badness.back() < kGoodBalance) break;
   }
   const double least = *std::min_element(badness.begin(), badness.end());

@@ -16,8 +16,9 @@ struct Controlled {
   BoxCreature creature = make_box_creature();
   Muscles muscles = make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights);
   physics::State rest{creature.scene.body.rest, Eigen::Matrix3Xd::Zero(3, creature.scene.body.node_count())};
-  std::vector<bool> standing = std::vector<bool>(static_cast<std::size_t>(creature.scene.contact_points.count()), true);
-  std::vector<bool> flying = std::vector<bool>(standing.size(), false);
+  std::vector<ContactState> standing =
+      std::vector<ContactState>(static_cast<std::size_t>(creature.scene.contact_points.count()), ContactState::kStick);
+  std::vector<ContactState> flying = std::vector<ContactState>(standing.size(), ContactState::kOff);
   Eigen::VectorXd passive = Eigen::VectorXd::Ones(creature.scene.body.edge_count());
 
   Corrector corrector(const CorrectorOptions& options = {}) const {

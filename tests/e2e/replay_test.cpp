@@ -81,6 +81,18 @@ TEST_F(Replay, PushesByAForceThatTheTraceTells) {
   EXPECT_EQ(audit.correction_ns, 0);
 }
 
+TEST_F(Replay, PutsAFallIntoFailedGlb) {
+  const std::string blow = "--push t=0.3,dv=20:0:0";
+  const Outcome aside = replay("-o motion.glb " + blow);
+  EXPECT_EQ(aside.exit_code, 3);
+  EXPECT_TRUE(fs::exists(directory_.path / "failed.glb"));
+  EXPECT_FALSE(fs::exists(directory_.path / "motion.glb"));
+  EXPECT_EQ(replay(blow).exit_code, 3);
+  EXPECT_TRUE(fs::exists(creature_ / "failed.glb"));
+  EXPECT_FALSE(fs::exists(creature_ / "replay.glb"));
+  EXPECT_EQ(report_of(creature_)["replay"]["closed_loop"]["fell"], true);
+}
+
 TEST_F(Replay, TracesTheMeansOverLongerRows) {
   const TraceAudit fine = traced("--duration 1"), coarse = traced("--duration 1 --trace-rate 30");
   EXPECT_NEAR(coarse.fastest_row_s, 1.0 / 30, 1e-9);

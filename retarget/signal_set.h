@@ -46,7 +46,7 @@ struct SolvedSignals {
 };
 
 struct SignalOptions {
-  double target_rms = 0.003;  // [-] RMS error of the activations that the cut may leave: per rest length, as they are
+  double target_rms = 0.001;  // [-] RMS error of the activations that the cut may leave: per rest length, as they are
   int harmonics = 0;          // 0: as few as meet the target
   int roll_off = 1;           // last harmonics that fade, so that the cut does not ring
 };

@@ -11,9 +11,8 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kFallSeconds = 0.2, kFallTilt = 50 * M_PI / 180;
-constexpr double kGlideReach = 0.04, kGlideTurn = 0.1, kGlideLeak = 0.3;  // per L; rad; 1/s
+constexpr double kGlideReach = 0.04, kGlideLeast = 0.005, kGlideTurn = 0.1, kGlideLeak = 0.3;  // per L, per L; rad; 1/s
 constexpr double kGlideSpeed = 0.15;  // of the target's RMS speed: a slow creature is not asked to catch up fast
-constexpr double kSlidingGrip = 0.0;  // of the corrector's hold on horizontal momentum where a patch is meant to slide
 constexpr double kStillSpeed = 0.01;  // of sqrt(g L): a loaded patch that moves faster slides
 
 double thread_seconds() {
@@ -145,15 +144,13 @@ long plan_frame_at(const Motion& target, double time_s) {
   return target.loop ? frame % target.count() : std::min<long>(frame, target.count() - 1);
 }
 
-/// Share of the patches in contact that are meant to stand; 1 in flight.
+/// 0 where a patch is meant to slide, 1 elsewhere.
 double planned_grip(const PreparedTarget& prepared, double time_s) {
   const long frame = plan_frame_at(prepared.target, time_s);
-  double standing = 0, sliding = 0;
   for (const std::vector<ContactState>& states : prepared.contacts.state) {
-    standing += states[static_cast<std::size_t>(frame)] == ContactState::kStick ? 1 : 0;
-    sliding += states[static_cast<std::size_t>(frame)] == ContactState::kSlide ? 1 : 0;
+    if (states[static_cast<std::size_t>(frame)] == ContactState::kSlide) return 0;
   }
-  return sliding > 0 ? kSlidingGrip * standing / (standing + sliding) : 1;
+  return 1;
 }
 
 }  // namespace
@@ -229,7 +226,7 @@ Replay replay(const ReplayInput& input, const ReplayOptions& options) {
   }
 
   const double target_speed = std::sqrt(velocities(target).colwise().squaredNorm().mean() / nodes);
-  const double reach = std::min(kGlideReach * length, kGlideSpeed * target_speed * options.corrector.settle_s);
+  const double reach = std::clamp(kGlideSpeed * target_speed * options.corrector.settle_s, kGlideLeast * length, kGlideReach * length);
   Glide glide{reach, kGlideTurn * reach / (kGlideReach * length)};
   Tally tally;
   double falling_for = 0, busy_seconds = 0, time = 0, highest = -1e300;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 namespace hydrostat::retarget {
@@ -24,6 +25,42 @@ void close_short_runs(std::vector<ContactState>& states, int least, bool loop) {
       for (int k = 0; k < run; ++k) at(f + k) = before;
     }
   }
+}
+
+/// Runs of `state` shorter than `least` become what `other` says of the states before and after; at the ends of what is no loop
+/// these are the run's own.
+void replace_runs(std::vector<ContactState>& states, ContactState state, int least, bool loop,
+                  const std::function<ContactState(ContactState before, ContactState after)>& other) {
+  const int count = static_cast<int>(states.size());
+  const std::vector<ContactState> old = states;
+  const auto at = [&](int f) { return old[static_cast<std::size_t>(((f % count) + count) % count)]; };
+  for (int f = 0; f < count; ++f) {
+    if (at(f) != state) continue;
+    int begin = f, end = f;
+    while (f - begin < count && (loop || begin > 0) && at(begin - 1) == state) --begin;
+    while (end - f < count && (loop || end < count - 1) && at(end + 1) == state) ++end;
+    if (end - begin + 1 >= least) continue;
+    states[static_cast<std::size_t>(f)] = other(loop || begin > 0 ? at(begin - 1) : state, loop || end < count - 1 ? at(end + 1) : state);
+  }
+}
+
+/// Sliding directions 2 x F as means over the sliding ones of five frames, so that friction turns round gently: where the direction
+/// turns, the mean is shorter than 1 and settles less of the friction. Zero where a patch does not slide.
+Eigen::MatrixXd settled_directions(const Eigen::MatrixXd& direction, const std::vector<ContactState>& states, bool loop) {
+  const Eigen::Index frames = direction.cols();
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, frames);
+  for (Eigen::Index f = 0; f < frames; ++f) {
+    if (states[static_cast<std::size_t>(f)] != ContactState::kSlide) continue;
+    int count = 0;
+    for (Eigen::Index d = -2; d <= 2; ++d) {
+      const Eigen::Index g = loop ? (f + d + frames) % frames : std::clamp<Eigen::Index>(f + d, 0, frames - 1);
+      if (states[static_cast<std::size_t>(g)] != ContactState::kSlide) continue;
+      mean.col(f) += direction.col(g);
+      ++count;
+    }
+    mean.col(f) /= count;
+  }
+  return mean;
 }
 
 }  // namespace
@@ -97,26 +134,20 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
         if (lowest < reach * ease && std::abs(velocity.y()) < fall) {
           state = sideways < still ? ContactState::kStick : ContactState::kSlide;
         }
-        if (sideways > 0) direction.col(f) << velocity.x() / sideways, velocity.z() / sideways;
+        if (sideways > 0) direction.col(f) = Eigen::Vector2d(velocity.x(), velocity.z()) / sideways;
         states[static_cast<std::size_t>(f)] = previous = state;
       }
     }
-    // A foot that brushes the ground on its way through is not dragged: sliding counts if it lasts.
-    std::vector<int> passing;
-    for (int f = 0, count = static_cast<int>(frames); f < count; ++f) {
-      if (states[static_cast<std::size_t>(f)] != ContactState::kSlide) continue;
-      int begin = f, end = f;
-      const auto state_at = [&](int k) { return states[static_cast<std::size_t>(((k % count) + count) % count)]; };
-      while (f - begin < count && (points.loop || begin > 0) && state_at(begin - 1) == ContactState::kSlide) --begin;
-      while (end - f < count && (points.loop || end < count - 1) && state_at(end + 1) == ContactState::kSlide) ++end;
-      if (end - begin + 1 < 2 * options.least_frames + 1) passing.push_back(f);
-    }
-    for (const int f : passing) states[static_cast<std::size_t>(f)] = ContactState::kOff;
+    // A foot that brushes the ground on its way through is not dragged: sliding counts if it lasts. What is dragged and slow for a
+    // moment does not stand: between slides, standing counts if it lasts.
+    const int least_run = 2 * options.least_frames + 1;
+    replace_runs(states, ContactState::kSlide, least_run, points.loop, [](ContactState, ContactState) { return ContactState::kOff; });
+    replace_runs(states, ContactState::kStick, least_run, points.loop, [](ContactState before, ContactState after) {
+      return before == ContactState::kSlide && after == ContactState::kSlide ? ContactState::kSlide : ContactState::kStick;
+    });
     close_short_runs(states, options.least_frames, points.loop);
     if (std::all_of(states.begin(), states.end(), [](ContactState s) { return s == ContactState::kOff; })) continue;
-    for (Eigen::Index f = 0; f < frames; ++f) {
-      if (states[static_cast<std::size_t>(f)] != ContactState::kSlide) direction.col(f).setZero();
-    }
+    direction = settled_directions(direction, states, points.loop);
     schedule.patches.push_back({bone_names[static_cast<std::size_t>(bone)], members});
     schedule.state.push_back(states);
     directions.push_back(direction);

@@ -22,7 +22,7 @@ struct ContactSchedule {
   std::vector<Patch> patches;                         // only those that ever touch
   std::vector<std::vector<ContactState>> state;       // patches x F
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> touching;  // contact points x F: bears load in that frame
-  Eigen::MatrixXd sliding_x, sliding_z;               // patches x F: direction of sliding, unit, 0 where it does not slide
+  Eigen::MatrixXd sliding_x, sliding_z;  // patches x F: direction of sliding times the share of friction that it settles, 0 to 1
 
   double flight_s(double rate_hz) const;  // frames without any contact
 };

@@ -106,6 +106,7 @@ class FrameSolver {
       problem_.AddResidualBlock(&edges_[e], nullptr, positions_.col(ends[0]).data(), positions_.col(ends[1]).data());
     }
     solver_options_.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    solver_options_.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
     solver_options_.num_threads = 1;
     solver_options_.max_num_iterations = options.max_iterations;
     solver_options_.function_tolerance = 1e-8;

@@ -7,6 +7,7 @@
 
 #include "physics/elastic_forces.h"
 #include "physics/system_matrix.h"
+#include "retarget/balance.h"
 #include "retarget/least_squares.h"
 
 namespace hydrostat::retarget {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <limits>
 #include <memory>
 
 namespace hydrostat::retarget {
@@ -58,128 +60,226 @@ class LinearRows final : public ceres::CostFunction {
   std::vector<RowMajorMatrix> jacobians_;
 };
 
-/// Projected coordinate descent from a feasible x: slow, but every step lowers the cost. For active sets that do not settle.
-void descend_along_coordinates(const BoundedLeastSquares& problem, Eigen::VectorXd& x) {
-  constexpr int kSweeps = 200;
-  const Eigen::SparseMatrix<double> columns = problem.jacobian;
-  Eigen::VectorXd residual = problem.jacobian * x - problem.target;
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    for (int c = 0; c < columns.cols(); ++c) {
-      double slope = 0, curvature = 0;
-      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, c); it; ++it) {
-        slope += it.value() * residual[it.row()];
-        curvature += it.value() * it.value();
-      }
-      if (curvature == 0) continue;
-      const double next = std::clamp(x[c] - slope / curvature, problem.lower[c], problem.upper[c]);
-      for (Eigen::SparseMatrix<double>::InnerIterator it(columns, c); it; ++it) residual[it.row()] += (next - x[c]) * it.value();
-      x[c] = next;
+/// sqrt(weight) (x - target) for one column: the barrier of its bounds. Weight and target change from step to step.
+class Barrier final : public ceres::SizedCostFunction<1, 1> {
+ public:
+  double weight = 0, target = 0;
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const double root = std::sqrt(weight);
+    residuals[0] = root * (parameters[0][0] - target);
+    if (jacobians != nullptr && jacobians[0] != nullptr) jacobians[0][0] = root;
+    return true;
+  }
+};
+
+ceres::Solver::Options linear_solver_options() {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // CHOLMOD spins on threads of its own at these sizes
+  options.initial_trust_region_radius = 1e16;
+  options.max_trust_region_radius = 1e20;
+  options.max_num_iterations = 1;  // linear: the first step lands
+  options.function_tolerance = 1e-14;
+  options.gradient_tolerance = 1e-16;
+  options.parameter_tolerance = 1e-12;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+constexpr int kPatience = 3;  // pivots that may pass without fewer wrong entries
+
+class BoundedSolver {
+ public:
+  BoundedSolver(const BoundedLeastSquares& problem, const Eigen::VectorXd& start)
+      : problem_(problem), options_(linear_solver_options()), columns_(static_cast<int>(problem.jacobian.cols())) {
+    solution_.x = start.cwiseMax(problem.lower).cwiseMin(problem.upper);
+    const int block_count = static_cast<int>(problem.column_blocks.size()) - 1;
+    std::vector<int> block_of_column(static_cast<std::size_t>(columns_));
+    for (int b = 0; b < block_count; ++b) {
+      const int first = problem.column_blocks[static_cast<std::size_t>(b)], end = problem.column_blocks[static_cast<std::size_t>(b) + 1];
+      for (int c = first; c < end; ++c) block_of_column[static_cast<std::size_t>(c)] = b;
+      ceres_.AddParameterBlock(solution_.x.data() + first, end - first);
     }
+    for (std::size_t k = 0; k + 1 < problem.row_blocks.size(); ++k) {
+      std::vector<int> blocks;
+      auto* rows = new LinearRows(problem, problem.row_blocks[k], problem.row_blocks[k + 1], block_of_column, blocks);
+      std::vector<double*> parameters;
+      for (const int b : blocks) parameters.push_back(solution_.x.data() + problem.column_blocks[static_cast<std::size_t>(b)]);
+      ceres_.AddResidualBlock(rows, nullptr, parameters);
+    }
+    side_.assign(static_cast<std::size_t>(columns_), 0);
+    for (int c = 0; c < columns_; ++c) {
+      if (solution_.x[c] <= problem.lower[c]) side_[static_cast<std::size_t>(c)] = -1;
+      if (solution_.x[c] >= problem.upper[c]) side_[static_cast<std::size_t>(c)] = 1;
+    }
+    const Eigen::VectorXd gradient_at_zero = problem.jacobian.transpose() * problem.target;
+    gradient_scale_ = std::max(gradient_at_zero.lpNorm<Eigen::Infinity>(), 1e-300);
+  }
+
+  BoundedSolution solve(int max_pivots) {
+    pivot(max_pivots);
+    if (!solution_.converged) {
+      approach_from_inside();
+      pivot(max_pivots);
+    }
+    solution_.x = solution_.x.cwiseMax(problem_.lower).cwiseMin(problem_.upper);
+    measure_kkt_residual();
+    return solution_;
+  }
+
+ private:
+  Eigen::VectorXd gradient() const { return problem_.jacobian.transpose() * (problem_.jacobian * solution_.x - problem_.target); }
+
+  void solve_free_entries() {
+    for (std::size_t b = 0; b + 1 < problem_.column_blocks.size(); ++b) {
+      const int first = problem_.column_blocks[b], at = side_[static_cast<std::size_t>(first)];
+      double* block = solution_.x.data() + first;
+      if (at == 0) {
+        ceres_.SetParameterBlockVariable(block);
+        continue;
+      }
+      assert(problem_.column_blocks[b + 1] == first + 1);
+      *block = at < 0 ? problem_.lower[first] : problem_.upper[first];
+      ceres_.SetParameterBlockConstant(block);
+    }
+    ceres::Solver::Summary summary;
+    ceres::Solve(options_, &ceres_, &summary);
+  }
+
+  /// Free entries outside their bounds, and clamped ones that the gradient pulls inside.
+  std::vector<int> wrong_entries() const {
+    const Eigen::VectorXd slope = gradient();
+    const double slack = 1e-9 * gradient_scale_;
+    std::vector<int> wrong;
+    for (int c = 0; c < columns_; ++c) {
+      const int at = side_[static_cast<std::size_t>(c)];
+      const bool out = at == 0 && (solution_.x[c] < problem_.lower[c] - 1e-12 || solution_.x[c] > problem_.upper[c] + 1e-12);
+      const bool pulls_inside = (at < 0 && slope[c] < -slack) || (at > 0 && slope[c] > slack);
+      if (out || pulls_inside) wrong.push_back(c);
+    }
+    return wrong;
+  }
+
+  /// Block principal pivoting: changes all wrong entries at once while their number falls, with some patience.
+  void pivot(int max_pivots) {
+    int fewest_wrong = columns_ + 1, patience = kPatience;
+    for (int k = 0; k < max_pivots; ++k) {
+      solve_free_entries();
+      ++solution_.pivots;
+      const std::vector<int> wrong = wrong_entries();
+      solution_.converged = wrong.empty();
+      if (solution_.converged) return;
+      if (static_cast<int>(wrong.size()) < fewest_wrong) {
+        fewest_wrong = static_cast<int>(wrong.size());
+        patience = kPatience;
+      } else if (--patience < 0) {
+        return;
+      }
+      for (const int c : wrong) {
+        int& at = side_[static_cast<std::size_t>(c)];
+        at = at != 0 ? 0 : (solution_.x[c] < problem_.lower[c] ? -1 : 1);
+      }
+    }
+  }
+
+  /// Primal-dual interior point: slower, but it always gets near. Leaves the solution and the active set that it points to.
+  void approach_from_inside();
+  void measure_kkt_residual();
+
+  const BoundedLeastSquares& problem_;
+  const ceres::Solver::Options options_;
+  const int columns_;
+  ceres::Problem ceres_;
+  BoundedSolution solution_;
+  std::vector<int> side_;  // -1: clamped at the lower bound, +1: at the upper one, 0: free
+  double gradient_scale_;
+};
+
+void BoundedSolver::approach_from_inside() {
+  constexpr int kSteps = 60;
+  constexpr double kToBoundary = 0.99, kCentring = 0.1, kGap = 1e-11;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd& x = solution_.x;
+  const Eigen::VectorXd &lower = problem_.lower, &upper = problem_.upper;
+  std::vector<int> bounded;
+  std::vector<Barrier*> barriers;
+  std::vector<ceres::ResidualBlockId> blocks;
+  for (std::size_t b = 0; b + 1 < problem_.column_blocks.size(); ++b) {
+    const int c = problem_.column_blocks[b];
+    ceres_.SetParameterBlockVariable(x.data() + c);
+    if (lower[c] == -kInfinity && upper[c] == kInfinity) continue;
+    const double width = std::min(upper[c] - lower[c], 1.0);
+    x[c] = std::clamp(x[c], lower[c] + 0.1 * width, upper[c] - 0.1 * width);
+    bounded.push_back(c);
+    barriers.push_back(new Barrier);
+    blocks.push_back(ceres_.AddResidualBlock(barriers.back(), nullptr, x.data() + c));
+  }
+  // Multipliers of the lower and upper bounds; those of infinite ones stay 0.
+  const Eigen::VectorXd scale = Eigen::VectorXd::Constant(columns_, 0.1 * gradient_scale_);
+  Eigen::VectorXd below = (lower.array() > -kInfinity).select(scale, 0), above = (upper.array() < kInfinity).select(scale, 0);
+  const auto gap = [&](int c) {
+    return (below[c] > 0 ? below[c] * (x[c] - lower[c]) : 0) + (above[c] > 0 ? above[c] * (upper[c] - x[c]) : 0);
+  };
+  double first_gap = 0;
+  for (int step = 0; step < kSteps; ++step) {
+    double mean_gap = 0;
+    for (const int c : bounded) mean_gap += gap(c) / static_cast<double>(bounded.size());
+    if (step == 0) first_gap = mean_gap;
+    if (mean_gap < kGap * first_gap) break;
+    const double mu = kCentring * mean_gap;
+    for (std::size_t k = 0; k < bounded.size(); ++k) {
+      const int c = bounded[k];
+      const double to_lower = x[c] - lower[c], to_upper = upper[c] - x[c];
+      barriers[k]->weight = below[c] / to_lower + above[c] / to_upper;
+      barriers[k]->target = x[c] + (mu / to_lower - mu / to_upper) / barriers[k]->weight;
+    }
+    const Eigen::VectorXd before = x;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options_, &ceres_, &summary);
+    const Eigen::VectorXd move = x - before;
+    Eigen::VectorXd below_move = Eigen::VectorXd::Zero(columns_), above_move = below_move;
+    double primal = 1, dual = 1;
+    const auto keep_positive = [](double value, double change, double& share) {
+      if (change < 0) share = std::min(share, -kToBoundary * value / change);
+    };
+    for (const int c : bounded) {
+      const double to_lower = before[c] - lower[c], to_upper = upper[c] - before[c];
+      if (below[c] > 0) below_move[c] = (mu - below[c] * move[c]) / to_lower - below[c];
+      if (above[c] > 0) above_move[c] = (mu + above[c] * move[c]) / to_upper - above[c];
+      keep_positive(to_lower, move[c], primal);
+      keep_positive(to_upper, -move[c], primal);
+      keep_positive(below[c], below_move[c], dual);
+      keep_positive(above[c], above_move[c], dual);
+    }
+    x = before + primal * move;
+    below += dual * below_move;
+    above += dual * above_move;
+  }
+  for (const int c : bounded) {
+    int& at = side_[static_cast<std::size_t>(c)];
+    at = 0;
+    // Near its bound and pressed against it: the multiplier, as a share of the gradient, outweighs the distance.
+    if (below[c] / gradient_scale_ > x[c] - lower[c]) at = -1;
+    if (above[c] / gradient_scale_ > upper[c] - x[c]) at = 1;
+  }
+  for (const ceres::ResidualBlockId block : blocks) ceres_.RemoveResidualBlock(block);
+}
+
+void BoundedSolver::measure_kkt_residual() {
+  const Eigen::VectorXd slope = gradient();
+  for (int c = 0; c < columns_; ++c) {
+    double violation = std::abs(slope[c]);
+    if (solution_.x[c] <= problem_.lower[c]) violation = std::max(0.0, -slope[c]);
+    if (solution_.x[c] >= problem_.upper[c]) violation = std::max(0.0, slope[c]);
+    solution_.kkt_residual = std::max(solution_.kkt_residual, violation / gradient_scale_);
   }
 }
 
 }  // namespace
 
 BoundedSolution solve(const BoundedLeastSquares& problem, const Eigen::VectorXd& start, int max_pivots) {
-  const int columns = static_cast<int>(problem.jacobian.cols());
-  const int block_count = static_cast<int>(problem.column_blocks.size()) - 1;
-  std::vector<int> block_of_column(static_cast<std::size_t>(columns));
-  for (int b = 0; b < block_count; ++b) {
-    for (int c = problem.column_blocks[static_cast<std::size_t>(b)]; c < problem.column_blocks[static_cast<std::size_t>(b) + 1]; ++c) {
-      block_of_column[static_cast<std::size_t>(c)] = b;
-    }
-  }
-  BoundedSolution solution;
-  solution.x = start.cwiseMax(problem.lower).cwiseMin(problem.upper);
-  Eigen::VectorXd& x = solution.x;
-
-  ceres::Problem ceres_problem;
-  for (int b = 0; b < block_count; ++b) {
-    const int first = problem.column_blocks[static_cast<std::size_t>(b)];
-    ceres_problem.AddParameterBlock(x.data() + first, problem.column_blocks[static_cast<std::size_t>(b) + 1] - first);
-  }
-  for (std::size_t k = 0; k + 1 < problem.row_blocks.size(); ++k) {
-    std::vector<int> blocks;
-    auto* rows = new LinearRows(problem, problem.row_blocks[k], problem.row_blocks[k + 1], block_of_column, blocks);
-    std::vector<double*> parameters;
-    for (const int b : blocks) parameters.push_back(x.data() + problem.column_blocks[static_cast<std::size_t>(b)]);
-    ceres_problem.AddResidualBlock(rows, nullptr, parameters);
-  }
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.initial_trust_region_radius = 1e16;
-  options.max_trust_region_radius = 1e20;
-  options.max_num_iterations = 4;
-  options.function_tolerance = 1e-14;
-  options.gradient_tolerance = 1e-16;
-  options.parameter_tolerance = 1e-12;
-  options.num_threads = 1;
-  options.logging_type = ceres::SILENT;
-
-  // -1: at the lower bound, +1: at the upper one, 0: free.
-  std::vector<int> side(static_cast<std::size_t>(columns), 0);
-  for (int c = 0; c < columns; ++c) {
-    if (x[c] <= problem.lower[c]) side[static_cast<std::size_t>(c)] = -1;
-    if (x[c] >= problem.upper[c]) side[static_cast<std::size_t>(c)] = 1;
-  }
-  const Eigen::VectorXd gradient_at_zero = problem.jacobian.transpose() * problem.target;
-  const double gradient_scale = std::max(gradient_at_zero.lpNorm<Eigen::Infinity>(), 1e-300);
-
-  int fewest_wrong = columns + 1, patience = 5;
-  Eigen::VectorXd gradient;
-  for (solution.pivots = 0; solution.pivots < max_pivots; ++solution.pivots) {
-    for (int b = 0; b < block_count; ++b) {
-      const int first = problem.column_blocks[static_cast<std::size_t>(b)];
-      const int at = side[static_cast<std::size_t>(first)];
-      if (at != 0) {
-        assert(problem.column_blocks[static_cast<std::size_t>(b) + 1] == first + 1);
-        x[first] = at < 0 ? problem.lower[first] : problem.upper[first];
-        ceres_problem.SetParameterBlockConstant(x.data() + first);
-      } else {
-        ceres_problem.SetParameterBlockVariable(x.data() + first);
-      }
-    }
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &ceres_problem, &summary);
-    gradient = problem.jacobian.transpose() * (problem.jacobian * x - problem.target);
-    std::vector<int> wrong;
-    for (int c = 0; c < columns; ++c) {
-      const int at = side[static_cast<std::size_t>(c)];
-      const double slack = 1e-9 * gradient_scale;
-      const bool out = at == 0 && (x[c] < problem.lower[c] - 1e-12 || x[c] > problem.upper[c] + 1e-12);
-      const bool pulls_inside = (at < 0 && gradient[c] < -slack) || (at > 0 && gradient[c] > slack);
-      if (out || pulls_inside) wrong.push_back(c);
-    }
-    if (wrong.empty()) {
-      solution.converged = true;
-      break;
-    }
-    // All at once while that helps; one at a time (the last, Murty's rule) when it does not, which ends for sure.
-    bool only_last = false;
-    if (static_cast<int>(wrong.size()) < fewest_wrong) {
-      fewest_wrong = static_cast<int>(wrong.size());
-      patience = 5;
-    } else if (patience > 0) {
-      --patience;
-    } else {
-      only_last = true;
-    }
-    for (std::size_t k = only_last ? wrong.size() - 1 : 0; k < wrong.size(); ++k) {
-      const int c = wrong[k];
-      int& at = side[static_cast<std::size_t>(c)];
-      at = at != 0 ? 0 : (x[c] < problem.lower[c] ? -1 : 1);
-    }
-  }
-  x = x.cwiseMax(problem.lower).cwiseMin(problem.upper);
-  if (!solution.converged) descend_along_coordinates(problem, x);
-  gradient = problem.jacobian.transpose() * (problem.jacobian * x - problem.target);
-  for (int c = 0; c < columns; ++c) {
-    double violation = std::abs(gradient[c]);
-    if (x[c] <= problem.lower[c]) violation = std::max(0.0, -gradient[c]);
-    if (x[c] >= problem.upper[c]) violation = std::max(0.0, gradient[c]);
-    solution.kkt_residual = std::max(solution.kkt_residual, violation / gradient_scale);
-  }
-  return solution;
+  return BoundedSolver(problem, start).solve(max_pivots);
 }
 
 }  // namespace hydrostat::retarget

@@ -25,9 +25,6 @@ struct PreparedTarget {
   std::vector<std::string> warnings;
 };
 
-/// Whittaker's smoother (penalty on third differences) over the padded frames; half amplitude at `cutoff_hz`.
-Motion smooth(const Motion& motion, double cutoff_hz);
-
 /// Smooths, locks feet, restores volume and shifts the centre of mass and turns the trunk until gravity, contact forces inside
 /// the friction pyramid and momentum balance. The ground is y = 0; `patch_bone` has the bone of each contact point of
 /// `scene`, `node_bone_weights` B x N says which bone owns which node. length [m] is L, size [m] is D.
@@ -35,15 +32,5 @@ Motion smooth(const Motion& motion, double cutoff_hz);
 PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const std::vector<int>& patch_bone,
                        const std::vector<std::string>& bone_names, const Eigen::MatrixXd& node_bone_weights, double length,
                        double size, const PrepareOptions& options);
-
-/// One generator of contact forces: direction of the force on contact point `point` for a unit coefficient.
-struct ContactGenerator {
-  int point;
-  Eigen::Vector3d force;  // a unit of normal force with its friction
-};
-
-/// The generators of frame f: a pyramid of four for each sticking point, one against the motion for each sliding point.
-std::vector<ContactGenerator> contact_generators(const ContactSchedule& contacts, Eigen::Index frame, double friction,
-                                                 double support_friction);
 
 }  // namespace hydrostat::retarget

@@ -73,7 +73,23 @@ TEST(LabelContacts, ADraggedFootSlidesAlongItsWay) {
   for (const Eigen::Index f : {35, 45, 55}) EXPECT_NEAR(contacts.sliding_x(0, f), -1, 1e-9);
   for (Eigen::Index f = 0; f < kFrames; ++f) {
     const double norm = std::hypot(contacts.sliding_x(0, f), contacts.sliding_z(0, f));
-    EXPECT_NEAR(norm, contacts.state[0][static_cast<std::size_t>(f)] == kSlide && norm > 0 ? 1 : 0, 1e-12);
+    EXPECT_LE(norm, contacts.state[0][static_cast<std::size_t>(f)] == kSlide ? 1 + 1e-12 : 0);
+  }
+}
+
+TEST(LabelContacts, WhatIsDraggedAndSlowForAMomentDoesNotStand) {
+  for (const int pause : {3, 5, 7, 12}) {
+    SCOPED_TRACE("frames at rest: " + std::to_string(pause));
+    const Motion dragged = head_and_foot([pause](Eigen::Index f) {
+      return Eigen::Vector2d(0.02 * static_cast<double>(f < 20 ? f : std::max<Eigen::Index>(20, f - pause)), 0);
+    }, false);
+    const ContactSchedule contacts = label(dragged);
+    ASSERT_EQ(contacts.patches.size(), 1u);
+    if (pause == 12) {
+      EXPECT_EQ(contacts.state[0][26], kStick) << "a rest of 0.2 s is a stance";
+      continue;
+    }
+    for (std::size_t f = 14; f < 34; ++f) EXPECT_NE(contacts.state[0][f], kStick) << "frame " << f;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <limits>
 #include <random>
@@ -147,6 +148,37 @@ TEST(BoundedLeastSquares, LargerProblemsConvergeFromAnyCorner) {
     if (seed % 2 == 0) start.head(300) = problem.lower.head(300);
     const BoundedSolution solution = solve(problem, start);
     expect_optimal(problem, solution);
+  }
+}
+
+/// Six rows that hundreds of nearly equal non-negative forces share, each held to zero by a weak row: active sets cycle here.
+BoundedLeastSquares shared_load(unsigned seed, int forces) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  BoundedLeastSquares problem;
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6 + forces, forces);
+  for (int k = 0; k < forces; ++k) {
+    const Eigen::Vector3d force(0.6 * uniform(random), 1, 0.6 * uniform(random)), arm(0.5 * uniform(random), -0.3, 0.2 * uniform(random));
+    rows.col(k).head<6>() << 60 * force, 60 * arm.cross(force);
+    rows(6 + k, k) = 0.1;
+  }
+  problem.jacobian = rows.sparseView();
+  problem.target = Eigen::VectorXd::Zero(6 + forces);
+  for (int r = 0; r < 6; ++r) problem.target[r] = 60 * (r == 1 ? 1 : 0.4 * uniform(random));
+  problem.lower = Eigen::VectorXd::Zero(forces);
+  problem.upper = Eigen::VectorXd::Constant(forces, std::numeric_limits<double>::infinity());
+  problem.row_blocks = {0, 6};
+  for (int k = 0; k < forces; ++k) problem.row_blocks.push_back(7 + k);
+  for (int k = 0; k <= forces; ++k) problem.column_blocks.push_back(k);
+  return problem;
+}
+
+TEST(BoundedLeastSquares, SharesALoadAmongHundredsOfForces) {
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const int forces = 10 + 5 * static_cast<int>(seed);
+    const BoundedSolution solution = solve(shared_load(seed, forces), Eigen::VectorXd::Constant(forces, 1e-3));
+    expect_optimal(shared_load(seed, forces), solution);
   }
 }
 

@@ -1,5 +1,7 @@
 #include "retarget/prepare.h"
 
+#include "retarget/smooth.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -63,32 +65,6 @@ TEST(Smooth, HalvesTheAmplitudeAtTheCutOff) {
     EXPECT_NEAR(gain(cutoff, cutoff), 0.5, 1e-3);
     EXPECT_GT(gain(std::floor(cutoff / 2), cutoff), 0.95);
     EXPECT_LT(gain(std::min(29.0, 2 * cutoff), cutoff), 0.13);
-  }
-}
-
-TEST(ContactGenerators, StayInsideTheConeAndOpposeTheSliding) {
-  const BoxCreature creature = make_box_creature();
-  ContactSchedule contacts = always_standing(creature, 3);
-  contacts.state[1][1] = ContactState::kOff;
-  contacts.state[2][1] = ContactState::kSlide;
-  contacts.sliding_x(2, 1) = 0.6;
-  contacts.sliding_z(2, 1) = -0.8;
-  contacts.touching(0, 1) = false;
-  std::vector<int> seen(static_cast<std::size_t>(creature.scene.contact_points.count()), 0);
-  for (const ContactGenerator& g : contact_generators(contacts, 1, 0.7, 0.9)) {
-    ++seen[static_cast<std::size_t>(g.point)];
-    EXPECT_EQ(g.force.y(), 1);
-    const bool slides = creature.patch_bone[static_cast<std::size_t>(g.point)] == 3;
-    if (slides) {
-      EXPECT_LT((g.force - Eigen::Vector3d(-0.7 * 0.6, 1, 0.7 * 0.8)).norm(), 1e-15);
-    }
-    if (!slides) {
-      EXPECT_NEAR(std::hypot(g.force.x(), g.force.z()), 0.63, 1e-15);
-    }
-  }
-  for (std::size_t p = 0; p < seen.size(); ++p) {
-    const int bone = creature.patch_bone[p];
-    EXPECT_EQ(seen[p], p == 0 || bone == 2 ? 0 : bone == 3 ? 1 : 4) << "point " << p;
   }
 }
 

@@ -87,12 +87,13 @@ ceres::Solver::Options linear_solver_options() {
   return options;
 }
 
-constexpr int kPatience = 3;  // pivots that may pass without fewer wrong entries
+constexpr int kPatience = 3;       // pivots that may pass without fewer wrong entries
+constexpr double kSlack = 1e-11;   // cosine between a column and the residuals that counts as none
 
 class BoundedSolver {
  public:
   BoundedSolver(const BoundedLeastSquares& problem, const Eigen::VectorXd& start)
-      : problem_(problem), options_(linear_solver_options()), columns_(static_cast<int>(problem.jacobian.cols())) {
+      : problem_(problem), options_(linear_solver_options()), columns_(static_cast<int>(problem.jacobian.cols())), curvature_(Eigen::VectorXd::Zero(columns_)) {
     solution_.x = start.cwiseMax(problem.lower).cwiseMin(problem.upper);
     const int block_count = static_cast<int>(problem.column_blocks.size()) - 1;
     std::vector<int> block_of_column(static_cast<std::size_t>(columns_));
@@ -113,15 +114,20 @@ class BoundedSolver {
       if (solution_.x[c] <= problem.lower[c]) side_[static_cast<std::size_t>(c)] = -1;
       if (solution_.x[c] >= problem.upper[c]) side_[static_cast<std::size_t>(c)] = 1;
     }
-    const Eigen::VectorXd gradient_at_zero = problem.jacobian.transpose() * problem.target;
-    gradient_scale_ = std::max(gradient_at_zero.lpNorm<Eigen::Infinity>(), 1e-300);
+    for (int r = 0; r < problem.jacobian.outerSize(); ++r) {
+      for (decltype(problem.jacobian)::InnerIterator it(problem.jacobian, r); it; ++it) curvature_[it.col()] += it.value() * it.value();
+    }
+    const double size = std::max(problem.target.norm(), 1e-300);
+    gradient_scale_ = (curvature_.cwiseSqrt() * size).cwiseMax(1e-300);
   }
 
   BoundedSolution solve(int max_pivots) {
     pivot(max_pivots);
     if (!solution_.converged) {
       approach_from_inside();
+      const Eigen::VectorXd near = solution_.x;
       pivot(max_pivots);
+      if (!solution_.converged) solution_.x = near;
     }
     solution_.x = solution_.x.cwiseMax(problem_.lower).cwiseMin(problem_.upper);
     measure_kkt_residual();
@@ -150,9 +156,9 @@ class BoundedSolver {
   /// Free entries outside their bounds, and clamped ones that the gradient pulls inside.
   std::vector<int> wrong_entries() const {
     const Eigen::VectorXd slope = gradient();
-    const double slack = 1e-9 * gradient_scale_;
     std::vector<int> wrong;
     for (int c = 0; c < columns_; ++c) {
+      const double slack = kSlack * gradient_scale_[c];
       const int at = side_[static_cast<std::size_t>(c)];
       const bool out = at == 0 && (solution_.x[c] < problem_.lower[c] - 1e-12 || solution_.x[c] > problem_.upper[c] + 1e-12);
       const bool pulls_inside = (at < 0 && slope[c] < -slack) || (at > 0 && slope[c] > slack);
@@ -193,12 +199,12 @@ class BoundedSolver {
   ceres::Problem ceres_;
   BoundedSolution solution_;
   std::vector<int> side_;  // -1: clamped at the lower bound, +1: at the upper one, 0: free
-  double gradient_scale_;
+  Eigen::VectorXd curvature_, gradient_scale_;  // per column: its square, and its length times the target's
 };
 
 void BoundedSolver::approach_from_inside() {
   constexpr int kSteps = 60;
-  constexpr double kToBoundary = 0.99, kCentring = 0.1, kGap = 1e-11;
+  constexpr double kToBoundary = 0.99, kCentring = 0.1, kGap = 1e-10;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Eigen::VectorXd& x = solution_.x;
   const Eigen::VectorXd &lower = problem_.lower, &upper = problem_.upper;
@@ -216,17 +222,16 @@ void BoundedSolver::approach_from_inside() {
     blocks.push_back(ceres_.AddResidualBlock(barriers.back(), nullptr, x.data() + c));
   }
   // Multipliers of the lower and upper bounds; those of infinite ones stay 0.
-  const Eigen::VectorXd scale = Eigen::VectorXd::Constant(columns_, 0.1 * gradient_scale_);
+  const Eigen::VectorXd scale = Eigen::VectorXd::Constant(columns_, std::max(gradient().lpNorm<Eigen::Infinity>(), 1e-12));
   Eigen::VectorXd below = (lower.array() > -kInfinity).select(scale, 0), above = (upper.array() < kInfinity).select(scale, 0);
   const auto gap = [&](int c) {
     return (below[c] > 0 ? below[c] * (x[c] - lower[c]) : 0) + (above[c] > 0 ? above[c] * (upper[c] - x[c]) : 0);
   };
-  double first_gap = 0;
   for (int step = 0; step < kSteps; ++step) {
-    double mean_gap = 0;
-    for (const int c : bounded) mean_gap += gap(c) / static_cast<double>(bounded.size());
-    if (step == 0) first_gap = mean_gap;
-    if (mean_gap < kGap * first_gap) break;
+    double sum = 0;
+    for (const int c : bounded) sum += gap(c);
+    const double cost = 0.5 * (problem_.jacobian * x - problem_.target).squaredNorm(), mean_gap = sum / static_cast<double>(bounded.size());
+    if (sum < kGap * cost) break;
     const double mu = kCentring * mean_gap;
     for (std::size_t k = 0; k < bounded.size(); ++k) {
       const int c = bounded[k];
@@ -259,9 +264,9 @@ void BoundedSolver::approach_from_inside() {
   for (const int c : bounded) {
     int& at = side_[static_cast<std::size_t>(c)];
     at = 0;
-    // Near its bound and pressed against it: the multiplier, as a share of the gradient, outweighs the distance.
-    if (below[c] / gradient_scale_ > x[c] - lower[c]) at = -1;
-    if (above[c] / gradient_scale_ > upper[c] - x[c]) at = 1;
+    // Pressed against its bound more than it lies away from it.
+    if (below[c] > curvature_[c] * (x[c] - lower[c])) at = -1;
+    if (above[c] > curvature_[c] * (upper[c] - x[c])) at = 1;
   }
   for (const ceres::ResidualBlockId block : blocks) ceres_.RemoveResidualBlock(block);
 }
@@ -272,7 +277,7 @@ void BoundedSolver::measure_kkt_residual() {
     double violation = std::abs(slope[c]);
     if (solution_.x[c] <= problem_.lower[c]) violation = std::max(0.0, -slope[c]);
     if (solution_.x[c] >= problem_.upper[c]) violation = std::max(0.0, slope[c]);
-    solution_.kkt_residual = std::max(solution_.kkt_residual, violation / gradient_scale_);
+    solution_.kkt_residual = std::max(solution_.kkt_residual, violation / gradient_scale_[c]);
   }
 }
 

@@ -16,7 +16,7 @@ struct BoundedLeastSquares {
 
 struct BoundedSolution {
   Eigen::VectorXd x;
-  double kkt_residual = 0;  // max violation of the optimality conditions [1], relative to the gradient at x = 0, bounds exact
+  double kkt_residual = 0;  // max violation of the optimality conditions [1]: gradient over the column's length times the target's, bounds exact
   int pivots = 0;
   bool converged = false;   // the active set stands: every clamped entry pushes against its bound, every free one is inside
 };

@@ -68,6 +68,7 @@ ReplayMetrics::ReplayMetrics(const ReplayInput& input, double control_s, long mo
       momentum_(physics::momentum(input.scene.body, start.v)),
       spin_(spin_of(input.scene.body, start)),
       course_(empty_course(most_steps, input.prepared.contacts.patches.size())),
+      highest_(start_com_.y()),
       patch_loaded_(input.prepared.contacts.patches.size(), false) {}
 
 void ReplayMetrics::add(const ControlStep& step) {
@@ -191,11 +192,8 @@ void ReplayMetrics::measure_drift(ReplayReport& report) const {
 }
 
 void ReplayMetrics::measure_apex(ReplayReport& report) const {
-  const Motion& clip = input_.clip_skin;
-  double clip_highest = -1e300;
-  for (Eigen::Index f = 0; f < clip.count(); ++f) clip_highest = std::max(clip_highest, clip.at(f).row(1).mean());
   report.apex_rise_length = (highest_ - start_com_.y()) / length_;
-  report.clip_apex_rise_length = (clip_highest - clip.at(0).row(1).mean()) / length_;
+  report.clip_apex_rise_length = input_.clip_rise / length_;
 }
 
 ReplayReport ReplayMetrics::figures() const {

@@ -64,7 +64,7 @@ class ReplayMetrics {
   ReplayReport report_;              // largest values so far
   ReplayCourse course_;
   Mean shape_, world_, clip_shape_, sole_gap_, correction_;
-  double slip_ = 0, highest_ = -1e300;
+  double slip_ = 0, highest_;
   long stances_ = 0;
   std::vector<bool> patch_loaded_;
   std::vector<double> cycle_, drift_, heading_;  // from the third cycle on

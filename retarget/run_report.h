@@ -53,7 +53,7 @@ struct ReplayReport {
   double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
   int inverted_elements = 0, guard_steps = 0;
   double correction_rms = 0, real_time_factor = 0;
-  double apex_rise_length = 0, clip_apex_rise_length = 0;  // highest COM above the start, per L
+  double apex_rise_length = 0, clip_apex_rise_length = 0;  // of the COM over its height at the start, per L
 };
 
 struct EffectReport {

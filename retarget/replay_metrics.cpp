@@ -102,6 +102,8 @@ void ReplayMetrics::compare_shape(const ControlStep& step) {
   const double volume_ratio = physics::volume(input_.scene.body, step.state.x) / rest_volume_;
   report_.volume_error_max = std::max(report_.volume_error_max, std::abs(volume_ratio - 1));
   course_.volume_ratio[steps_ - 1] = volume_ratio;
+  const auto inverted = (physics::jacobians(input_.scene.body, step.state.x).array() <= 0).count();
+  report_.inverted_elements = std::max(report_.inverted_elements, static_cast<int>(inverted));
 }
 
 void ReplayMetrics::compare_way(const ControlStep& step) {

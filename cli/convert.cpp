@@ -17,6 +17,7 @@
 #include "io/import.h"
 #include "io/signals_file.h"
 #include "io/stage_records.h"
+#include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/run_warnings.h"
 
@@ -116,6 +117,7 @@ retarget::Performer make_performer(const retarget::Creature& creature, const ret
   performer.prepared = std::move(prepared);
   performer.clip_points = motion.skin_points;
   performer.clip_skin = motion.skin;
+  performer.clip_rise = retarget::apex_rise(retarget::com_path(motion.nodes, creature.scene.body.mass));
   performer.length = creature.length;
   performer.size = creature.size;
   return performer;
@@ -151,11 +153,12 @@ retarget::BodyReport body_report(const retarget::Creature& creature) {
   return report;
 }
 
-io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::RunReport& report) {
+io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report) {
   io::CreatureRecord record;
   record.source_file = fs::absolute(options.clip_file).string();
   record.source_sha256 = report.source.sha256;
   record.clip = report.source.clip;
+  record.clip_rise_m = performer.clip_rise;
   record.settings = {{"height", options.height},         {"nodes", std::int64_t{options.nodes}},
                      {"root-motion", options.root_motion}, {"limit", report.inverse.limit},
                      {"limit-chosen-by", options.limit == "auto" ? std::string("auto") : std::string("user")},
@@ -263,7 +266,7 @@ class Conversion {
   void write() {
     const retarget::Performer& performer = target_.performer;
     stages_.run("files", [&] {
-      writer_.write("creature.toml", io::to_toml(creature_record(options_, target_.report)));
+      writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report)));
       writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                                dominant_bones_of_nodes(creature_.mesh.bone_weights)));
       writer_.write("target.bin", target_file_);

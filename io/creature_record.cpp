@@ -59,6 +59,14 @@ std::string text_of(const std::string& file, const toml::table& table, std::stri
   return **node->as_string();
 }
 
+double number_of(const std::string& file, const toml::table& table, std::string_view key) {
+  const toml::node* node = table.get(key);
+  if (node == nullptr || !node->is_number()) {
+    throw Error(file, where(table.source()), "a number '" + std::string(key) + "' is missing", kMend);
+  }
+  return *node->value<double>();
+}
+
 CreatureRecord::Setting setting_of(const std::string& file, const std::string& key, const toml::node& node) {
   if (const auto* flag = node.as_boolean()) return **flag;
   if (const auto* number = node.as_integer()) return **number;
@@ -83,6 +91,7 @@ std::string to_toml(const CreatureRecord& record) {
   put(out, "file", record.source_file);
   put(out, "sha256", record.source_sha256);
   put(out, "clip", record.clip);
+  put(out, "clip_rise_m", record.clip_rise_m);
   out << "\n[settings]\n";
   for (const auto& [key, setting] : record.settings) {
     std::visit([&out, &name = key](const auto& value) { put(out, name, value); }, setting);
@@ -108,7 +117,7 @@ CreatureRecord read_creature_record(const std::filesystem::path& creature) {
     }
     const toml::table& source = table_of(file, root, "source");
     CreatureRecord record{
-        text_of(file, source, "file"), text_of(file, source, "sha256"), text_of(file, source, "clip"), {}, {}};
+        text_of(file, source, "file"), text_of(file, source, "sha256"), text_of(file, source, "clip"), number_of(file, source, "clip_rise_m"), {}, {}};
     std::vector<std::pair<toml::source_position, std::pair<std::string, CreatureRecord::Setting>>> settings;
     for (const auto& [key, node] : table_of(file, root, "settings")) {
       const std::string name(key.str());

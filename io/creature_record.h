@@ -18,6 +18,7 @@ struct CreatureRecord {
   std::string source_file;                                // as the user gave it, made absolute
   std::string source_sha256;                              // of its bytes
   std::string clip;                                       // name in the file
+  double clip_rise_m = 0;                                 // of its centre of mass on this body, over its height at the start
   std::vector<std::pair<std::string, Setting>> settings;  // option without dashes in front -> value in use; order is kept
   std::vector<Effect> effects;
 };

@@ -46,6 +46,7 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
   LoadedCreature loaded;
   loaded.record = read_creature_record(creature);
   loaded.target = parse_target(read_file(target_file), target_file.string());
+  loaded.target.performer.clip_rise = loaded.record.clip_rise_m;
   parse_body(read_file(body_file), body_file.string(), loaded.target.performer);
   loaded.signals = read_signals(signals_file);
   if (!target_fits_body(loaded.target.performer)) throw Error(target_file.string(), "", "does not belong to body.json", kMend);

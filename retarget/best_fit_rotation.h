@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "physics/body.h"
 #include "retarget/motion.h"
 
 namespace hydrostat::retarget {
@@ -13,6 +14,16 @@ namespace hydrostat::retarget {
 Eigen::Matrix3d best_fit_rotation(const Eigen::Ref<const Eigen::Matrix3Xd>& rest,
                                   const Eigen::Ref<const Eigen::Matrix3Xd>& positions,
                                   const Eigen::Ref<const Eigen::VectorXd>& mass);
+
+/// How cloud a comes to lie closest to cloud b: turned about its mean, which is put on that of b.
+struct RigidFit {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d mean_a, mean_b;
+  double rms;  // what is left [unit of a]
+};
+
+/// The same rotation with all that belongs to it, of a's points to b's (3 x N each); `weights` N, sum 1.
+RigidFit best_rigid_fit(const physics::ConstPoints& a, const physics::ConstPoints& b, const Eigen::VectorXd& weights);
 
 /// best_fit_rotation of every frame as unit quaternions, each on the hemisphere of the one before it, the first with w >= 0.
 std::vector<Eigen::Quaterniond> best_fit_rotations(const Eigen::Ref<const Eigen::Matrix3Xd>& rest, const Motion& motion,

@@ -15,6 +15,11 @@ Eigen::VectorXd moved(const Eigen::Isometry3d& move, const Eigen::Ref<const Eige
 
 }  // namespace
 
+Eigen::Index frame_at(const Motion& motion, double time_s) {
+  const auto frame = static_cast<Eigen::Index>(time_s * motion.rate_hz);
+  return motion.loop ? frame % motion.count() : std::min(frame, motion.count() - 1);
+}
+
 Eigen::Isometry3d after_cycles(const Motion& motion, long cycles) {
   Eigen::Isometry3d one = Eigen::Isometry3d::Identity();
   if (!motion.loop) return one;

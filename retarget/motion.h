@@ -24,6 +24,9 @@ struct Motion {
   Eigen::Map<Eigen::Matrix3Xd> at(Eigen::Index f) { return {frames.data() + f * frames.rows(), 3, frames.rows() / 3}; }
 };
 
+/// The frame that is on at a time [s] >= 0: loops go on for ever, one-shots hold their last.
+Eigen::Index frame_at(const Motion& motion, double time_s);
+
 /// Where the loop stands after `cycles` periods (may be negative), as a rigid move; identity for one-shots.
 Eigen::Isometry3d after_cycles(const Motion& motion, long cycles);
 

@@ -37,8 +37,8 @@ Replay run(const Performer& performer, const physics::Scene& plant, const FeedFo
            const ReplayOptions& options) {
   const ReplayInput input{plant,        performer.scene,       performer.prepared,
                           performer.muscles, feed_forward,     performer.clip_points,
-                          performer.scene.contact_points, performer.length, performer.size,
-                          limit};
+                          performer.scene.contact_points, performer.clip_rise, performer.length,
+                          performer.size, limit};
   return replay(input, options);
 }
 

@@ -19,6 +19,7 @@ struct Performer {
   PreparedTarget prepared;
   Motion clip_points;      // the contact points as the clip has them, 3P x F
   Motion clip_skin;        // all of the skin likewise, thinned for the eye, 3V x F
+  double clip_rise = 0;    // [m] of the centre of mass of the clip's nodes, over its height at the start
   double length = 1, size = 1;  // L and D [m]
 };
 

@@ -37,6 +37,7 @@ struct ReplayInput {
   std::function<void(double time_s, Eigen::VectorXd& activation)> feed_forward;  // E
   Motion clip_skin;                       // the imported clip's skin points, 3V x F, on the ground and with its travel
   physics::ContactPoints skin_points;     // the same points in the body
+  double clip_rise = 0;                   // [m] of the centre of mass of the imported clip: apex_rise of its com_path
   double length = 1, size = 1, limit = 0.3;
 };
 

@@ -51,9 +51,10 @@ struct ReplayReport {
   double heading_deg_per_cycle = 0, travel_per_cycle_length = 0, clip_travel_per_cycle_length = 0;
   double slip_per_stance_length = 0, sole_gap_length = 0, penetration_max_size = 0, volume_error_max = 0;
   double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
-  int inverted_elements = 0, guard_steps = 0;
+  int inverted_elements = 0;  // the most in any control step
+  int guard_steps = 0;
   double correction_rms = 0, real_time_factor = 0;
-  double apex_rise_length = 0, clip_apex_rise_length = 0;  // highest COM above the start, per L
+  double apex_rise_length = 0, clip_apex_rise_length = 0;  // of the COM over its height at the start, per L
 };
 
 struct EffectReport {

@@ -15,6 +15,32 @@ Matrix interval_means(const Matrix& rows, Eigen::Index every) {
 
 }  // namespace
 
+Trace empty_trace(const physics::Body& body, Eigen::Index rows) {
+  Trace trace;
+  trace.time_s.resize(rows);
+  trace.mass_kg = body.mass;
+  trace.position.resize(body.rest.size(), rows);
+  trace.velocity = trace.position;
+  trace.contact_force = Eigen::MatrixXd::Zero(body.rest.size(), rows);
+  trace.effect_force = trace.correction_impulse = trace.contact_force;
+  trace.contact_moment = Eigen::Matrix3Xd::Zero(3, rows);
+  trace.effect_moment = trace.contact_moment;
+  trace.activation.resize(body.edge_count(), rows);
+  trace.edges = body.edges;
+  trace.rest_length_m = body.rest_length;
+  trace.elements = body.tets;
+  return trace;
+}
+
+void shorten(Trace& trace, Eigen::Index rows) {
+  trace.time_s.conservativeResize(rows);
+  for (Eigen::MatrixXd* course : {&trace.position, &trace.velocity, &trace.contact_force, &trace.effect_force, &trace.correction_impulse, &trace.activation}) {
+    course->conservativeResize(Eigen::NoChange, rows);
+  }
+  trace.contact_moment.conservativeResize(Eigen::NoChange, rows);
+  trace.effect_moment.conservativeResize(Eigen::NoChange, rows);
+}
+
 Trace thinned(const Trace& trace, int every) {
   if (every == 1 || trace.count() == 0) return trace;
   const Eigen::Index intervals = (trace.count() - 1) / every;

@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "physics/body.h"
+
 namespace hydrostat::retarget {
 
 /// A free simulation written down for an audit: column s of every time course is one row of the trace. Forces and moments are
@@ -24,6 +26,12 @@ struct Trace {
 
   Eigen::Index count() const { return time_s.size(); }
 };
+
+/// A trace of a body with room for `rows` rows, forces and moments zero.
+Trace empty_trace(const physics::Body& body, Eigen::Index rows);
+
+/// Cuts off what comes after the first `rows` rows.
+void shorten(Trace& trace, Eigen::Index rows);
 
 /// The trace with a row for every `every` of its steps: forces, moments and activations are means over the longer interval, impulses
 /// sums. Steps at the end that do not fill an interval are left out.

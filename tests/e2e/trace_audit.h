@@ -113,4 +113,51 @@ inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::fil
   return found;
 }
 
+/// What a trace says of the time that its body spends in the air.
+struct FlightAudit {
+  double longest_s = 0;        // without any contact force
+  double height_m = -1e300;    // in that time, the highest that the lowest contact point comes
+  double fall_miss = 0;        // in all such times, |COM'' - g| / |g|, COM'' by second differences of the positions
+};
+
+namespace audit {
+
+inline double lowest_point(const nlohmann::json& points, const Eigen::Matrix3Xd& x) {
+  double lowest = 1e300;
+  for (std::size_t p = 0; p < points.at("nodes").size(); ++p) {
+    double height = 0;
+    for (std::size_t k = 0; k < 4; ++k) height += points["weights"][p][k].get<double>() * x(1, points["nodes"][p][k].get<int>());
+    lowest = std::min(lowest, height);
+  }
+  return lowest;
+}
+
+}  // namespace audit
+
+inline FlightAudit audit_flight(const std::filesystem::path& trace, const std::filesystem::path& creature) {
+  const auto read = [&](const char* name) { return io::read_npy_double(trace / name); };
+  const auto time = read("time.npy"), mass = read("mass.npy"), position = read("position.npy"), contact = read("contact_force.npy");
+  const nlohmann::json points = nlohmann::json::parse(io::read_file(creature / "body.json")).at("contact_points");
+  const Eigen::Map<const Eigen::VectorXd> m(mass.values.data(), static_cast<Eigen::Index>(mass.values.size()));
+  const auto com = [&](std::size_t row) { return Eigen::Vector3d(audit::points(position, row) * m / m.sum()); };
+  const Eigen::Vector3d gravity(0, -9.81, 0);
+  FlightAudit found;
+  double seconds = 0, height = -1e300;
+  for (std::size_t s = 1; s < time.values.size(); ++s) {
+    if (audit::points(contact, s).norm() > 0) {
+      seconds = 0, height = -1e300;
+      continue;
+    }
+    const double dt = time.values[s] - time.values[s - 1];
+    if (seconds > 0) {  // the row before was free too
+      const Eigen::Vector3d acceleration = (com(s) - 2 * com(s - 1) + com(s - 2)) / (dt * dt);
+      found.fall_miss = std::max(found.fall_miss, (acceleration - gravity).norm() / gravity.norm());
+    }
+    seconds += dt;
+    height = std::max(height, audit::lowest_point(points, audit::points(position, s)));
+    if (seconds > found.longest_s) found.longest_s = seconds, found.height_m = height;
+  }
+  return found;
+}
+
 }  // namespace hydrostat

@@ -15,6 +15,7 @@ CreatureRecord example() {
   return {"/clips/big \"dog\"\\trot.fbx",
           "00ff",
           "Armature|Tröt\n",
+          0.125,
           {{"nodes", std::int64_t{200}},
            {"limit", "auto"},
            {"height", 0.1},
@@ -38,6 +39,7 @@ TEST(CreatureRecord, ComesBackAsItWasWritten) {
   EXPECT_EQ(back.source_file, record.source_file);
   EXPECT_EQ(back.source_sha256, record.source_sha256);
   EXPECT_EQ(back.clip, record.clip);
+  EXPECT_EQ(back.clip_rise_m, record.clip_rise_m);
   EXPECT_EQ(back.settings, record.settings);
   ASSERT_EQ(back.effects.size(), 2U);
   EXPECT_EQ(back.effects[0].name, "ground");
@@ -69,6 +71,11 @@ TEST(CreatureRecord, NamesTheLineOfWhatIsWrong) {
 
   const std::string without = refusal_of("schema = \"hydrostat.creature/1\"\n[source]\nfile = \"a\"\n[settings]\n");
   EXPECT_NE(without.find("|line 2|a text 'sha256' is missing|"), std::string::npos) << without;
+
+  std::string wordy_text = to_toml(example());
+  wordy_text.replace(wordy_text.find("clip_rise_m = 0.125"), 19, "clip_rise_m = \"high\"");
+  const std::string wordy = refusal_of(wordy_text);
+  EXPECT_NE(wordy.find("a number 'clip_rise_m' is missing|"), std::string::npos) << wordy;
 
   const std::string no_source = refusal_of("schema = \"hydrostat.creature/1\"\n");
   EXPECT_NE(no_source.find("|the table [source] is missing|"), std::string::npos) << no_source;

@@ -65,6 +65,24 @@ TEST(BestFitRotation, AMirroredBodyIsStillOnlyTurned) {
   }
 }
 
+TEST(BestRigidFit, IsTheBestRotationWithWhatItLeaves) {
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Cloud cloud = random_cloud(seed);
+    const Eigen::VectorXd weights = cloud.mass / cloud.mass.sum();
+    const Eigen::Vector3d offset(3, -1, 2);
+    const Eigen::Matrix3Xd moved = (cloud.turn * cloud.points).colwise() + offset;
+    const RigidFit exact = best_rigid_fit(cloud.points, moved, weights);
+    EXPECT_LT((exact.rotation - cloud.turn).norm(), 1e-12);
+    EXPECT_LT((exact.mean_b - cloud.turn * exact.mean_a - offset).norm(), 1e-12);
+    EXPECT_LT(exact.rms, 1e-12);
+    const Eigen::Matrix3Xd bent = moved + 0.3 * random_cloud(seed + 1000).points;
+    const RigidFit fit = best_rigid_fit(cloud.points, bent, weights);
+    EXPECT_LT((fit.rotation - best_fit_rotation(cloud.points, bent, cloud.mass)).norm(), 1e-10);
+    EXPECT_NEAR(fit.rms * fit.rms, misfit(cloud, bent, fit.rotation) / cloud.mass.sum(), 1e-12);
+  }
+}
+
 TEST(BestFitRotations, StayOnOneHemisphereOverManyTurns) {
   const Cloud cloud = random_cloud(7);
   Motion motion;

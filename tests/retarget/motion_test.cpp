@@ -4,6 +4,7 @@
 
 #include <random>
 #include <string>
+#include <tuple>
 
 namespace hydrostat::retarget {
 namespace {
@@ -47,6 +48,18 @@ Eigen::Matrix3Xd speeds(const MotionCurve& curve, double time) {
   Eigen::Matrix3Xd x, v;
   curve.at(time, x, v);
   return v;
+}
+
+TEST(FrameAt, GoesRoundInALoopAndStaysAtTheEndOfAOneShot) {
+  Motion motion;
+  motion.rate_hz = 10;
+  motion.frames = Eigen::MatrixXd::Zero(3, 4);
+  for (const auto& [time, of_loop, of_one_shot] : {std::tuple{0.0, 0, 0}, {0.19, 1, 1}, {0.35, 3, 3}, {0.41, 0, 3}, {1.15, 3, 3}}) {
+    motion.loop = true;
+    EXPECT_EQ(frame_at(motion, time), of_loop) << time;
+    motion.loop = false;
+    EXPECT_EQ(frame_at(motion, time), of_one_shot) << time;
+  }
 }
 
 TEST(AfterCycles, AreTheCyclesOneAfterAnother) {

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "retarget/com_path.h"
 #include "retarget/inverse_dynamics.h"
 #include "tests/retarget/box_creature.h"
 
@@ -30,7 +32,7 @@ struct Actor {
       activation = inverse.activation.col(target.target.loop ? frame % inverse.activation.cols() : std::min(frame, inverse.activation.cols() - 1));
     };
     return {creature.scene, creature.scene, target, muscles, feed_forward, point_motion(creature.scene.contact_points, target.target),
-            creature.scene.contact_points, BoxCreature::kLength, creature.size(), 0.3};
+            creature.scene.contact_points, /*clip_rise=*/0, BoxCreature::kLength, creature.size(), 0.3};
   }
 };
 
@@ -170,6 +172,27 @@ TEST(Replay, TravelOfAClipThatStandsInPlaceIsNone) {
   EXPECT_LT(std::abs(result.report.travel_per_cycle_length), 1e-3);
   EXPECT_EQ(result.report.clip_travel_per_cycle_length, 0);
   EXPECT_LT(std::abs(result.report.heading_deg_per_cycle), 0.01);
+}
+
+TEST(Replay, AReplayThatIsItsClipHasTheSameApex) {
+  Actor actor;
+  actor.creature.scene.has_ground = false;
+  for (const double speed : {0.3, 1.0, 2.0, -1.0}) {  // thrown up, or down
+    SCOPED_TRACE("speed " + std::to_string(speed));
+    ReplayOptions options = lasting(0.6, false);
+    options.pushes = {{0, 0.05, Eigen::Vector3d(0.1, speed, 0)}};
+    const Replay first = replay(actor.input(), options);
+    Motion clip;
+    clip.rate_hz = 120;
+    clip.frames = first.trace.position;
+    ReplayInput input = actor.input();
+    input.clip_rise = apex_rise(com_path(clip, actor.creature.scene.body.mass));
+    const ReplayReport report = replay(input, options).report;
+    EXPECT_NEAR(report.apex_rise_length, report.clip_apex_rise_length, 1e-12);
+    // What was thrown up within 0.05 s, against gravity, flies on as a stone does.
+    const double thrown = std::max(0.0, speed - 0.05 * 9.81);
+    EXPECT_NEAR(report.apex_rise_length * BoxCreature::kLength, 0.5 * 0.05 * thrown + thrown * thrown / (2 * 9.81), 1e-4);
+  }
 }
 
 TEST(UsualDuration, IsFifteenCyclesOrTenSecondsAndASecondMoreForAOneShot) {

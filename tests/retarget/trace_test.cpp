@@ -37,5 +37,17 @@ TEST(Thinned, LeavesOutWhatFillsNoInterval) {
   EXPECT_EQ(thinned(Trace(), 2).count(), 0);
 }
 
+TEST(Shorten, CutsEveryCourseAlike) {
+  Trace trace = counting_trace();
+  shorten(trace, 3);
+  EXPECT_EQ(trace.count(), 3);
+  for (const Eigen::MatrixXd* course : {&trace.position, &trace.velocity, &trace.contact_force, &trace.effect_force, &trace.correction_impulse}) {
+    EXPECT_EQ(course->row(0), Eigen::RowVector3d(0, 1, 2));
+  }
+  EXPECT_EQ(trace.contact_moment.row(2), Eigen::RowVector3d(0, 1, 2));
+  EXPECT_EQ(trace.effect_moment.cols(), 3);
+  EXPECT_EQ(trace.activation.cols(), 3);
+}
+
 }  // namespace
 }  // namespace hydrostat::retarget

@@ -1,0 +1,34 @@
+#pragma once
+
+#include "physics/stepper.h"
+#include "retarget/contacts.h"
+
+namespace hydrostat::retarget {
+
+/// From when on a contact point or a patch bears load within a control step, and from when on it slides.
+struct ContactThresholds {
+  double point_impulse, patch_impulse;  // [N s]
+  double sliding_speed;                 // [m/s]
+};
+
+/// For a body of length L `length` [m] and control steps of `seconds`.
+ContactThresholds contact_thresholds(const physics::Scene& scene, double length, double seconds);
+
+/// Height [m] of a contact point above the ground.
+double height_above_ground(const physics::Scene& scene, const physics::State& state, int point);
+
+/// What contact points do, P: `impulse` 3 x P [N s] is what the ground gave each of them in the control step that ends in
+/// `state`.
+std::vector<ContactState> point_states(const physics::Scene& scene, const physics::State& state,
+                                       const Eigen::Matrix3Xd& impulse, const ContactThresholds& thresholds);
+
+/// The load on a patch.
+struct PatchLoad {
+  double normal_impulse = 0;  // [N s]
+  double speed = 0;           // [m/s] along the ground, mean by load; 0 without
+  double gap = 1e300;         // [m] of its lowest point above the ground
+};
+PatchLoad patch_load(const physics::Scene& scene, const Patch& patch, const physics::State& state,
+                     const Eigen::Matrix3Xd& impulse);
+
+}  // namespace hydrostat::retarget

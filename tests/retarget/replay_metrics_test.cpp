@@ -1,0 +1,136 @@
+#include "retarget/replay_metrics.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+
+#include "tests/retarget/box_creature.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kStep = 1.0 / 120;
+
+/// The box held against a target that stands, one control step after the other.
+class Measured {
+ public:
+  Measured() : metrics_(input_, kStep, 100, state) { impulses.contact.colwise() = creature.mass() / points() * kStep * up(); }
+
+  Eigen::Index points() const { return creature.scene.contact_points.count(); }
+  Eigen::Vector3d up() const { return -creature.scene.gravity; }
+  void step() {
+    ++steps_;
+    const Eigen::VectorXd shares = creature.scene.body.mass / creature.mass();
+    const RigidFit fit = best_rigid_fit(creature.scene.body.rest, state.x, shares);
+    const ContactThresholds thresholds = contact_thresholds(creature.scene, BoxCreature::kLength, kStep);
+    const auto touching = point_states(creature.scene, state, impulses.contact, thresholds);
+    impulses.contact_nodes.setZero();
+    for (int p = 0; p < points(); ++p) {
+      for (int k = 0; k < 4; ++k) {
+        impulses.contact_nodes.col(creature.scene.contact_points.nodes(k, p)) += creature.scene.contact_points.weights(k, p) * impulses.contact.col(p);
+      }
+    }
+    metrics_.add({steps_ * kStep, state, target_state_, fit, activation, correction, impulses, touching});
+  }
+  ReplayReport figures() const { return metrics_.figures(); }
+  ReplayCourse course() const { return metrics_.course(); }
+
+  BoxCreature creature = make_box_creature();
+  physics::State state{creature.scene.body.rest, Eigen::Matrix3Xd::Zero(3, creature.scene.body.node_count())};
+  physics::Impulses impulses = physics::make_impulses(creature.scene);
+  Eigen::VectorXd activation = Eigen::VectorXd::Ones(creature.scene.body.edge_count());
+  double correction = 0;
+
+ private:
+  physics::State target_state_ = state;
+  Muscles muscles_ = make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights);
+  PreparedTarget target_ = as_prepared(standing(creature, 6), always_standing(creature, 6));
+  ReplayInput input_{creature.scene, creature.scene, target_, muscles_, {}, point_motion(creature.scene.contact_points, target_.target),
+                     creature.scene.contact_points, 0, BoxCreature::kLength, creature.size(), 0.3};
+  ReplayMetrics metrics_;
+  int steps_ = 0;
+};
+
+TEST(ReplayMetrics, ABodyThatIsItsTargetHasNoError) {
+  Measured run;
+  for (int k = 0; k < 60; ++k) run.step();
+  const ReplayReport report = run.figures();
+  EXPECT_NEAR(report.duration_s, 0.5, 1e-12);
+  EXPECT_NEAR(report.cycles, 5, 1e-12);
+  for (const double error : {report.shape_rms_length, report.clip_shape_rms_length, report.world_rms_length, report.drift_per_cycle_length,
+                             report.heading_deg_per_cycle, report.slip_per_stance_length, report.sole_gap_length, report.penetration_max_size,
+                             report.volume_error_max, report.momentum_residual_mg, report.correction_rms, report.apex_rise_length}) {
+    EXPECT_NEAR(error, 0, 1e-9);
+  }
+  EXPECT_EQ(report.inverted_elements, 0);
+  EXPECT_EQ(run.course().time_s.size(), 60);
+}
+
+TEST(ReplayMetrics, AnElementThatInvertsForOneStepIsNotForgotten) {
+  const physics::Body body = make_box_creature().scene.body;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Measured run;
+    std::mt19937 random(seed);
+    const Eigen::Matrix3Xd sound = run.state.x;
+    Eigen::Index most = 0;
+    for (int k = 0; k < 6; ++k) {
+      if (k == 2 || k == 3) {  // a corner pushed through the face opposite
+        const Eigen::Vector4i tet = body.tets.col(static_cast<Eigen::Index>(random() % static_cast<unsigned>(body.tet_count())));
+        const Eigen::Vector3d face = (sound.col(tet[1]) + sound.col(tet[2]) + sound.col(tet[3])) / 3;
+        run.state.x.col(tet[0]) = 2 * face - sound.col(tet[0]);
+      }
+      run.step();
+      most = std::max(most, (physics::jacobians(body, run.state.x).array() <= 0).count());
+      run.state.x = sound;
+    }
+    EXPECT_GT(most, 0);
+    EXPECT_EQ(run.figures().inverted_elements, most);
+  }
+}
+
+TEST(ReplayMetrics, SlipIsTheWayOfLoadedPatchesAlone) {
+  Measured run;
+  for (int k = 0; k < 12; ++k) {
+    run.state.v.row(0).setConstant(k < 6 ? 0.5 : 0);
+    run.step();
+  }
+  EXPECT_NEAR(run.figures().slip_per_stance_length, 6 * kStep * 0.5 / BoxCreature::kLength, 1e-12);
+  run.impulses.contact.setZero();
+  run.state.v.row(0).setConstant(5);
+  for (int k = 0; k < 12; ++k) run.step();
+  EXPECT_NEAR(run.figures().slip_per_stance_length, 6 * kStep * 0.5 / BoxCreature::kLength, 1e-12);
+}
+
+TEST(ReplayMetrics, AForceThatIsNotBookedIsSeen) {
+  Measured run;
+  run.step();
+  run.state.v.row(2).array() += 0.01 * 9.81 * kStep;  // a hidden hand of 0.01 mg
+  run.step();
+  EXPECT_NEAR(run.figures().momentum_residual_mg, 0.01, 1e-9);
+}
+
+TEST(ReplayMetrics, DriftAndHeadingAreSlopesPerCycle) {
+  Measured run;
+  const Eigen::Matrix3Xd rest = run.state.x;
+  for (int k = 1; k <= 96; ++k) {  // eight cycles of a tenth of a second
+    const double cycles = k / 12.0;
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.3 * cycles, Eigen::Vector3d::UnitY()).toRotationMatrix();  // beyond half a turn
+    const Eigen::Vector3d com = rest * run.creature.scene.body.mass / run.creature.mass();
+    run.state.x = (turn * (rest.colwise() - com)).colwise() + (com + Eigen::Vector3d(0.03, 0, 0.04) * cycles);
+    run.step();
+  }
+  EXPECT_NEAR(run.figures().drift_per_cycle_length, 0.05 / BoxCreature::kLength, 1e-9);
+  EXPECT_NEAR(run.figures().heading_deg_per_cycle, 1.3 * 180 / M_PI, 1e-6);
+}
+
+TEST(ReplayMetrics, OfNoStepsAreNone) {
+  const Measured run;
+  EXPECT_EQ(run.figures().duration_s, 0);
+  EXPECT_EQ(run.course().time_s.size(), 0);
+  EXPECT_EQ(run.course().com.cols(), 0);
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

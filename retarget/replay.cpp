@@ -74,7 +74,17 @@ std::vector<ContactState> first_touching(const ContactSchedule& contacts) {
   return states;
 }
 
+bool is_dragged(const ContactSchedule& contacts) {
+  const auto slides = [](const std::vector<ContactState>& states) {
+    return std::find(states.begin(), states.end(), ContactState::kSlide) != states.end();
+  };
+  return std::any_of(contacts.state.begin(), contacts.state.end(), slides);
+}
+
+/// What is dragged over the ground goes as far as friction lets it: its reference gives way at once, for chasing a path would only
+/// twist and roll the body.
 ReferenceGlide glide_of(const Motion& target, const ReplayInput& input, const ReplayOptions& options) {
+  if (is_dragged(input.prepared.contacts)) return make_glide(0, options.corrector.settle_s, input.length);
   const double speed = std::sqrt(velocities(target).colwise().squaredNorm().mean() / input.scene.body.node_count());
   return make_glide(speed, options.corrector.settle_s, input.length);
 }

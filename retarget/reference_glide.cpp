@@ -11,6 +11,13 @@ constexpr double kTurn = 0.1;                         // [rad] at the full reach
 constexpr double kLeak = 0.3;                         // [1/s]
 constexpr double kSpeed = 0.15;                       // of the target's RMS speed
 
+bool is_dragged(const ContactSchedule& contacts) {
+  const auto slides = [](const std::vector<ContactState>& states) {
+    return std::find(states.begin(), states.end(), ContactState::kSlide) != states.end();
+  };
+  return std::any_of(contacts.state.begin(), contacts.state.end(), slides);
+}
+
 }  // namespace
 
 double yaw_of(const Eigen::Matrix3d& rotation) {
@@ -46,6 +53,12 @@ ReferenceGlide make_glide(double speed, double settle_s, double length) {
   glide.reach = std::clamp(kSpeed * speed * settle_s, kLeastReach * length, kReach * length);
   glide.turn_reach = kTurn * glide.reach / (kReach * length);
   return glide;
+}
+
+ReferenceGlide glide_for(const PreparedTarget& plan, double settle_s, double length) {
+  const double nodes = static_cast<double>(plan.target.frames.rows()) / 3;
+  const double speed = is_dragged(plan.contacts) ? 0 : std::sqrt(velocities(plan.target).colwise().squaredNorm().mean() / nodes);
+  return make_glide(speed, settle_s, length);
 }
 
 }  // namespace hydrostat::retarget

@@ -2,6 +2,7 @@
 
 #include "physics/body.h"
 #include "retarget/best_fit_rotation.h"
+#include "retarget/prepare.h"
 
 namespace hydrostat::retarget {
 
@@ -22,5 +23,9 @@ struct ReferenceGlide {
 /// The glide for a target whose nodes move at `speed` [m/s] RMS, corrected over settle_s [s]; length [m] is L. A slow
 /// creature is not asked to catch up fast.
 ReferenceGlide make_glide(double speed, double settle_s, double length);
+
+/// The glide for a plan. What is dragged over the ground goes as far as friction lets it: its reference gives way at once, as for a
+/// creature that stands, for chasing a path would only twist and roll the body.
+ReferenceGlide glide_for(const PreparedTarget& plan, double settle_s, double length);
 
 }  // namespace hydrostat::retarget

@@ -74,21 +74,6 @@ std::vector<ContactState> first_touching(const ContactSchedule& contacts) {
   return states;
 }
 
-bool is_dragged(const ContactSchedule& contacts) {
-  const auto slides = [](const std::vector<ContactState>& states) {
-    return std::find(states.begin(), states.end(), ContactState::kSlide) != states.end();
-  };
-  return std::any_of(contacts.state.begin(), contacts.state.end(), slides);
-}
-
-/// What is dragged over the ground goes as far as friction lets it: its reference gives way at once, for chasing a path would only
-/// twist and roll the body.
-ReferenceGlide glide_of(const Motion& target, const ReplayInput& input, const ReplayOptions& options) {
-  if (is_dragged(input.prepared.contacts)) return make_glide(0, options.corrector.settle_s, input.length);
-  const double speed = std::sqrt(velocities(target).colwise().squaredNorm().mean() / input.scene.body.node_count());
-  return make_glide(speed, options.corrector.settle_s, input.length);
-}
-
 /// One free simulation, from control step to control step.
 class Run {
  public:
@@ -139,7 +124,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       curve_(target_),
       stepper_(physics::make_stepper(options.method, input.scene)),
       corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
-      glide_(glide_of(target_, input, options)),
+      glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
       state_(first_state(target_, curve_)),
       activation_(input.scene.body.edge_count()),
       touching_(first_touching(input.prepared.contacts)),

@@ -6,6 +6,8 @@
 #include <random>
 #include <string>
 
+#include "tests/retarget/box_creature.h"
+
 namespace hydrostat::retarget {
 namespace {
 
@@ -45,6 +47,17 @@ TEST(ReferenceGlide, IsNeverFurtherFromTheBodyThanItsReach) {
     EXPECT_LE(level_distance(offset, glide), glide.reach + 1e-12);
     EXPECT_LE(std::abs(std::remainder(yaw - glide.yaw, 2 * M_PI)), glide.turn_reach + 1e-12);
   }
+}
+
+TEST(ReferenceGlide, GivesWayAtOnceWhereThePlanDragsTheBody) {
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = bobbing(creature, 20, 0.3);
+  PreparedTarget plan = as_prepared(motion, always_standing(creature, motion.count()));
+  const ReferenceGlide stands = glide_for(plan, 0.3, 1);
+  plan.contacts.state[0][7] = ContactState::kSlide;  // one frame of one patch
+  const ReferenceGlide dragged = glide_for(plan, 0.3, 1);
+  EXPECT_EQ(dragged.reach, make_glide(0, 0.3, 1).reach);
+  EXPECT_GT(stands.reach, 2 * dragged.reach);
 }
 
 TEST(ReferenceGlide, ComesBackWhenTheBodyDoes) {

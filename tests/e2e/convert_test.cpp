@@ -24,9 +24,9 @@ struct Gate {
   double apex;                          // of a jump: at most so far from the clip's rise, as a share of it; 0: not in the air
 };
 constexpr Gate kGates[] = {
-    {"worm_crawl.glb", "loop", true, 4.99, 0.04, 0.04, 0.85, 1.15, 0.05, 0},
-    {"boxdog_trot.fbx", "loop", true, 14.99, 0.02, 0.04, 0.92, 1.08, 0.005, 0},
-    {"boxdog_jump.glb", "one_shot", true, 1, 0.04, 0.06, 0.75, 1.25, 0.2, 0.25},
+    {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.85, 1.15, 0.04, 0},
+    {"boxdog_trot.fbx", "loop", true, 14.99, 0.01, 0.04, 0.92, 1.08, 0.003, 0},
+    {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.25},
 };
 // Of the inverse dynamics, on every sample.
 constexpr double kMiss = 3e-4, kRootResidual = 0.01, kSaturated = 0.05;

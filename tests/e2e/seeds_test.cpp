@@ -1,0 +1,42 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/e2e/made_creature.h"
+
+namespace hydrostat {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kUsualSeeds = 5;        // HYDROSTAT_SEEDS asks for more
+constexpr double kLeastShare = 0.7;   // of the seeds that must pass
+constexpr double kNaiveDrift = 5;     // times the closed loop's, at least, where the naive run stays up at all
+
+bool is_a_good_trot(const json& run) {
+  const double travel = run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>();
+  return !run["fell"] && run["cycles"] > 14.99 && run["shape_rms_length"] < 0.02 && std::abs(travel - 1) < 0.08 &&
+         std::abs(run["drift_per_cycle_length"].get<double>()) < 0.005;
+}
+
+// HYDROSTAT_SEEDS=20 ctest --preset release -R Seeds
+TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
+  const char* wished = std::getenv("HYDROSTAT_SEEDS");
+  const int seeds = std::max(1, wished != nullptr ? std::atoi(wished) : kUsualSeeds);
+  const TemporaryDirectory directory;
+  int good = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    convert(directory.path, "boxdog_trot.fbx", "creature", "--seed " + std::to_string(seed));
+    const json replays = report_of(directory.path / "creature")["replay"];
+    good += is_a_good_trot(replays["closed_loop"]) ? 1 : 0;
+    const json& naive = replays["naive"];
+    EXPECT_TRUE(naive["fell"] || naive["drift_per_cycle_length"] > kNaiveDrift * replays["closed_loop"]["drift_per_cycle_length"].get<double>())
+        << "seed " << seed << ": what carries the body without signals?";
+  }
+  EXPECT_GE(good, kLeastShare * seeds);
+}
+
+}  // namespace
+}  // namespace hydrostat

@@ -30,33 +30,34 @@ constexpr double kRounding = 1e-12;  // of the potential [-]: a smaller decrease
 /// and the end velocity follows from them, so linear momentum balances to rounding. Backward Euler damps rotation: the loss
 /// of angular momentum is the method's own and no booked moment covers it. Source: Li et al., "Incremental Potential
 /// Contact", SIGGRAPH 2020, eq. (1) to (5), with springs for the barrier; the lagged normal force is section 5.4's.
-class EulerStepper final : public Stepper {
+template <int Dim>
+class EulerStepper final : public StepperOf<Dim> {
  public:
-  explicit EulerStepper(const Scene& scene)
+  explicit EulerStepper(const SceneOf<Dim>& scene)
       : scene_(scene),
         matrix_(scene.body),
-        anchor_(3, scene.contact_points.count()),
-        contact_force_(3, scene.contact_points.count()),
+        anchor_(Dim, scene.contact_points.count()),
+        contact_force_(Dim, scene.contact_points.count()),
         touching_(static_cast<std::size_t>(scene.contact_points.count()), 0),
         friction_limit_(scene.contact_points.count()),
         last_limit_(scene.contact_points.count()),
-        foreseen_(3, scene.body.node_count()),
-        moved_(3, scene.body.node_count()),
-        trial_(3, scene.body.node_count()),
-        residual_(3, scene.body.node_count()),
-        force_(3, scene.body.node_count()),
-        direction_(3 * scene.body.node_count()),
+        foreseen_(Dim, scene.body.node_count()),
+        moved_(Dim, scene.body.node_count()),
+        trial_(Dim, scene.body.node_count()),
+        residual_(Dim, scene.body.node_count()),
+        force_(Dim, scene.body.node_count()),
+        direction_(Dim * scene.body.node_count()),
         start_{scene.body.rest, scene.body.rest} {
     const double gravity = scene.gravity.norm();
-    size_ = std::cbrt(scene.body.rest_volume.sum());
+    size_ = size_of_volume<Dim>(scene.body.rest_volume.sum());
     contact_stiffness_ = scene.body.mass.sum() * (gravity > 0 ? gravity : kWeightOfNoGravity) / (kSinkage * size_);
   }
 
   double substep(double dt) const override { return dt; }
 
-  Termination step(double dt, const Eigen::VectorXd& activation, const Eigen::Matrix3Xd* effect_force, State& state,
-                   Impulses& impulses) override {
-    const Body& body = scene_.body;
+  Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
+                   ImpulsesOf<Dim>& impulses) override {
+    const BodyOf<Dim>& body = scene_.body;
     start_ = state;
     foreseen_ = state.x + dt * state.v;
     for (int i = 0; i < body.node_count(); ++i) {
@@ -98,13 +99,13 @@ class EulerStepper final : public Stepper {
   }
 
  private:
-  double gap(const ConstPoints& x, int p) const {
+  double gap(const ConstPointsOf<Dim>& x, int p) const {
     return scene_.ground.normal.dot(scene_.contact_points.of(x, p)) - scene_.ground.offset;
   }
 
   /// From a point's anchor to the point, along the ground [m].
-  Eigen::Vector3d travel(const ConstPoints& x, int p) const {
-    const Eigen::Vector3d whole = scene_.contact_points.of(x, p) - anchor_.col(p);
+  VectorOf<Dim> travel(const ConstPointsOf<Dim>& x, int p) const {
+    const VectorOf<Dim> whole = scene_.contact_points.of(x, p) - anchor_.col(p);
     return whole - scene_.ground.normal.dot(whole) * scene_.ground.normal;
   }
 
@@ -114,16 +115,16 @@ class EulerStepper final : public Stepper {
     }
   }
 
-  void drag_anchors(const ConstPoints& x) {
+  void drag_anchors(const ConstPointsOf<Dim>& x) {
     for (int p = 0; p < scene_.contact_points.count(); ++p) {
       touching_[static_cast<std::size_t>(p)] = friction_limit_[p] > 0 || gap(x, p) < 0;
-      const Eigen::Vector3d from_anchor = travel(x, p);
+      const VectorOf<Dim> from_anchor = travel(x, p);
       const double pull = contact_stiffness_ * from_anchor.norm();
       if (pull > friction_limit_[p]) anchor_.col(p) += (1 - friction_limit_[p] / pull) * from_anchor;
     }
   }
 
-  void update_friction_limits(const ConstPoints& x) {
+  void update_friction_limits(const ConstPointsOf<Dim>& x) {
     if (!scene_.has_ground) return;
     for (int p = 0; p < scene_.contact_points.count(); ++p) {
       friction_limit_[p] = scene_.ground.friction * contact_stiffness_ * std::max(0.0, -gap(x, p));
@@ -131,15 +132,15 @@ class EulerStepper final : public Stepper {
   }
 
   /// What the step minimises [J].
-  double potential(const Eigen::Matrix3Xd& x, double dt, const Eigen::VectorXd& activation) const {
-    const Body& body = scene_.body;
+  double potential(const PointsOf<Dim>& x, double dt, const Eigen::VectorXd& activation) const {
+    const BodyOf<Dim>& body = scene_.body;
     double sum = elastic_energy(body, x, activation);
     for (int i = 0; i < body.node_count(); ++i) {
       sum += 0.5 * body.mass[i] * (x.col(i) - foreseen_.col(i)).squaredNorm() / (dt * dt);
     }
     for (int e = 0; e < body.edge_count(); ++e) {
       const int i = body.edges(0, e), j = body.edges(1, e);
-      const Eigen::Vector3d span = start_.x.col(j) - start_.x.col(i);
+      const VectorOf<Dim> span = start_.x.col(j) - start_.x.col(i);
       const double length_squared = span.squaredNorm();
       if (length_squared == 0) continue;
       const double along = (x.col(j) - x.col(i) - span).dot(span);
@@ -157,9 +158,9 @@ class EulerStepper final : public Stepper {
   }
 
   /// Fills contact_force_ and residual_, the gradient of the potential [N].
-  void find_residual(const Eigen::Matrix3Xd& x, double dt, const Eigen::VectorXd& activation) {
-    const Body& body = scene_.body;
-    const ContactPoints& points = scene_.contact_points;
+  void find_residual(const PointsOf<Dim>& x, double dt, const Eigen::VectorXd& activation) {
+    const BodyOf<Dim>& body = scene_.body;
+    const ContactPointsOf<Dim>& points = scene_.contact_points;
     force_.setZero();
     add_elastic_forces(body, x, activation, force_);
     moved_ = (x - start_.x) / dt;
@@ -167,16 +168,16 @@ class EulerStepper final : public Stepper {
     contact_force_.setZero();
     if (scene_.has_ground) {
       for (int p = 0; p < points.count(); ++p) {
-        Eigen::Vector3d push = Eigen::Vector3d::Zero();
+        VectorOf<Dim> push = VectorOf<Dim>::Zero();
         const double depth = gap(x, p);
         if (depth < 0) push = -contact_stiffness_ * depth * scene_.ground.normal;
         if (friction_limit_[p] > 0) {
-          const Eigen::Vector3d from_anchor = travel(x, p);
+          const VectorOf<Dim> from_anchor = travel(x, p);
           const double pull = contact_stiffness_ * from_anchor.norm();
           push -= (contact_stiffness_ * (pull > friction_limit_[p] ? friction_limit_[p] / pull : 1)) * from_anchor;
         }
         contact_force_.col(p) = push;
-        for (int k = 0; k < 4; ++k) force_.col(points.nodes(k, p)) += points.weights(k, p) * push;
+        for (int k = 0; k <= Dim; ++k) force_.col(points.nodes(k, p)) += points.weights(k, p) * push;
       }
     }
     for (int i = 0; i < body.node_count(); ++i) {
@@ -193,15 +194,15 @@ class EulerStepper final : public Stepper {
     return largest;
   }
 
-  void add_contact_stiffness(const ConstPoints& x) {
-    const Eigen::Vector3d normal = scene_.ground.normal;
+  void add_contact_stiffness(const ConstPointsOf<Dim>& x) {
+    const VectorOf<Dim> normal = scene_.ground.normal;
     for (int p = 0; p < scene_.contact_points.count(); ++p) {
-      Eigen::Matrix3d block = Eigen::Matrix3d::Zero();
+      BlockOf<Dim> block = BlockOf<Dim>::Zero();
       if (gap(x, p) < 0) block = contact_stiffness_ * normal * normal.transpose();
       if (friction_limit_[p] > 0) {
-        const Eigen::Vector3d from_anchor = travel(x, p);
+        const VectorOf<Dim> from_anchor = travel(x, p);
         const double distance = from_anchor.norm();
-        Eigen::Matrix3d tangential = Eigen::Matrix3d::Identity() - normal * normal.transpose();
+        BlockOf<Dim> tangential = BlockOf<Dim>::Identity() - normal * normal.transpose();
         if (contact_stiffness_ * distance > friction_limit_[p]) {
           tangential -= from_anchor * from_anchor.transpose() / (distance * distance);
           tangential *= friction_limit_[p] / distance;
@@ -215,8 +216,8 @@ class EulerStepper final : public Stepper {
   }
 
   /// One Newton step with line search. False: the potential cannot be lowered along it.
-  bool move_downhill(double dt, const Eigen::VectorXd& activation, Eigen::Matrix3Xd& x) {
-    const Body& body = scene_.body;
+  bool move_downhill(double dt, const Eigen::VectorXd& activation, PointsOf<Dim>& x) {
+    const BodyOf<Dim>& body = scene_.body;
     matrix_.set_zero();
     matrix_.add_mass(body, 1 / (dt * dt));
     matrix_.add_stiffness(body, x, activation, 1);
@@ -229,7 +230,7 @@ class EulerStepper final : public Stepper {
     if (!(slope < 0)) return false;
     double part = 1;
     for (int k = 0; k < kHalvings; ++k, part /= 2) {
-      trial_ = x + part * direction_.reshaped(3, body.node_count());
+      trial_ = x + part * direction_.reshaped(Dim, body.node_count());
       if (potential(trial_, dt, activation) <= here + kArmijo * part * slope + kRounding * std::abs(here)) {
         x.swap(trial_);
         return true;
@@ -238,44 +239,49 @@ class EulerStepper final : public Stepper {
     return false;
   }
 
-  void book(double dt, const Eigen::Matrix3Xd* effect_force, State& state, Impulses& impulses) const {
-    const Body& body = scene_.body;
-    const ContactPoints& points = scene_.contact_points;
+  void book(double dt, const PointsOf<Dim>* effect_force, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
+    const BodyOf<Dim>& body = scene_.body;
+    const ContactPointsOf<Dim>& points = scene_.contact_points;
     impulses.contact = dt * contact_force_;
     impulses.contact_nodes.setZero();
     impulses.contact_moment.setZero();
     for (int p = 0; p < points.count(); ++p) {
-      const Eigen::Vector3d impulse = impulses.contact.col(p), place = points.of(state.x, p);
-      for (int k = 0; k < 4; ++k) impulses.contact_nodes.col(points.nodes(k, p)) += points.weights(k, p) * impulse;
-      impulses.contact_moment += place.cross(impulse);
+      const VectorOf<Dim> impulse = impulses.contact.col(p), place = points.of(state.x, p);
+      for (int k = 0; k <= Dim; ++k) impulses.contact_nodes.col(points.nodes(k, p)) += points.weights(k, p) * impulse;
+      impulses.contact_moment += cross<Dim>(place, impulse);
     }
     impulses.effect_nodes.setZero();
     impulses.effect_moment.setZero();
     if (effect_force != nullptr) {
       impulses.effect_nodes = dt * *effect_force;
       for (int i = 0; i < body.node_count(); ++i) {
-        impulses.effect_moment += dt * state.x.col(i).cross(effect_force->col(i));
+        impulses.effect_moment += dt * cross<Dim>(state.x.col(i), effect_force->col(i));
       }
     }
-    impulses.gravity_moment = dt * (state.x * body.mass).cross(scene_.gravity);
+    impulses.gravity_moment = dt * cross<Dim>(state.x * body.mass, scene_.gravity);
     state.v = start_.v + impulses.effect_nodes * body.mass.cwiseInverse().asDiagonal();
     for (int i = 0; i < body.node_count(); ++i) state.v.col(i) += dt * (force_.col(i) / body.mass[i] + scene_.gravity);
   }
 
-  const Scene& scene_;
-  SystemMatrix matrix_;
+  const SceneOf<Dim>& scene_;
+  SystemMatrixOf<Dim> matrix_;
   double size_ = 0, contact_stiffness_ = 0;      // [m], [N/m] of a contact point, normal and tangential
-  Eigen::Matrix3Xd anchor_, contact_force_;      // [m], [N] 3 x P
+  PointsOf<Dim> anchor_, contact_force_;         // [m], [N] Dim x P
   std::vector<char> touching_;                   // P: at the end of the last step
   Eigen::VectorXd friction_limit_, last_limit_;  // [N] P, of this and the last Newton step
-  Eigen::Matrix3Xd foreseen_;                    // [m] where gravity and effects alone take the nodes
-  Eigen::Matrix3Xd moved_, trial_, residual_, force_;
+  PointsOf<Dim> foreseen_;                       // [m] where gravity and effects alone take the nodes
+  PointsOf<Dim> moved_, trial_, residual_, force_;
   Eigen::VectorXd direction_;
-  State start_;
+  StateOf<Dim> start_;
 };
 
 }  // namespace
 
-std::unique_ptr<Stepper> make_euler_stepper(const Scene& scene) { return std::make_unique<EulerStepper>(scene); }
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_euler_stepper(const SceneOf<Dim>& scene) {
+  return std::make_unique<EulerStepper<Dim>>(scene);
+}
+template std::unique_ptr<StepperOf<2>> make_euler_stepper<2>(const SceneOf<2>&);
+template std::unique_ptr<StepperOf<3>> make_euler_stepper<3>(const SceneOf<3>&);
 
 }  // namespace hydrostat::physics

@@ -27,14 +27,15 @@ double longest_substep(const StiffestMode& mode) {
 /// The mode that limits the substep h of the linear motion about the rest shape: while 4 M - 2 h D - h^2 K stays positive,
 /// the roots of the amplification polynomial stay in the unit disc. The dashpots act along edges alone, the stiffest modes
 /// are those of volume: with D itself the bound is several times longer than with D = (largest damping time) K.
-StiffestMode stiffest_mode_at_rest(const Body& body) {
-  SystemMatrix stiffness(body), damping(body);
+template <int Dim>
+StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body) {
+  SystemMatrixOf<Dim> stiffness(body), damping(body);
   stiffness.set_zero();
   stiffness.add_stiffness(body, body.rest, Eigen::VectorXd::Ones(body.edge_count()), 1);
   damping.set_zero();
   damping.add_damping(body, body.rest, 1);
-  Eigen::VectorXd root_mass(3 * body.node_count());
-  for (int i = 0; i < body.node_count(); ++i) root_mass.segment<3>(3 * i).setConstant(std::sqrt(body.mass[i]));
+  Eigen::VectorXd root_mass(Dim * body.node_count());
+  for (int i = 0; i < body.node_count(); ++i) root_mass.segment<Dim>(Dim * i).setConstant(std::sqrt(body.mass[i]));
   Eigen::VectorXd y(root_mass.size()), kz(y.size()), dz(y.size());
   for (Eigen::Index i = 0; i < y.size(); ++i) y[i] = std::cos(1.7 * static_cast<double>(i * i % 97));
   // Power iteration on M^-1 (2 h D + h^2 K) / 4 while h follows its largest eigenvalue toward 1, by Rayleigh's quotient.
@@ -42,8 +43,8 @@ StiffestMode stiffest_mode_at_rest(const Body& body) {
   for (int k = 0; k < 300; ++k) {
     y.normalize();
     const Eigen::VectorXd z = y.cwiseQuotient(root_mass);
-    kz = (stiffness.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
-    dz = (damping.lower().selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
+    kz = (stiffness.lower().template selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
+    dz = (damping.lower().template selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
     mode = {y.dot(dz), y.dot(kz)};
     const double h = longest_substep(mode);
     y = 2 * h * dz + h * h * kz;
@@ -53,13 +54,15 @@ StiffestMode stiffest_mode_at_rest(const Body& body) {
 
 /// Largest of the tets' own frequencies squared [1/s2] by their volume springs: these stiffen with the square of the area of
 /// their faces.
-double stiffest_volume(const Body& body, const ConstPoints& x, const Eigen::VectorXd& inverse_mass) {
+template <int Dim>
+double stiffest_volume(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass) {
   double largest = 0;
   for (int t = 0; t < body.tet_count(); ++t) {
     double jacobian;
-    const Eigen::Matrix<double, 3, 4> gradient = jacobian_gradient(x, body.tets, t, body.rest_volume[t], jacobian);
+    const Eigen::Matrix<double, Dim, Dim + 1> gradient =
+        jacobian_gradient<Dim>(x, body.tets, t, body.rest_volume[t], jacobian);
     double sum = 0;
-    for (int k = 0; k < 4; ++k) sum += gradient.col(k).squaredNorm() * inverse_mass[body.tets(k, t)];
+    for (int k = 0; k <= Dim; ++k) sum += gradient.col(k).squaredNorm() * inverse_mass[body.tets(k, t)];
     largest = std::max(largest, body.volume_stiffness[t] * sum);
   }
   return largest;
@@ -70,20 +73,21 @@ double stiffest_volume(const Body& body, const ConstPoints& x, const Eigen::Vect
 /// Internal forces are pairwise and taken at the positions from which the step starts, so linear and angular momentum
 /// change by the booked impulses alone, to rounding. Contact is solved on the velocity that moves the body: a point at gap g
 /// may approach with g / h at most; projected Gauss-Seidel over the points inside Coulomb's cone (Moreau's time stepping).
-class ExplicitStepper final : public Stepper {
+template <int Dim>
+class ExplicitStepper final : public StepperOf<Dim> {
  public:
-  explicit ExplicitStepper(const Scene& scene)
+  explicit ExplicitStepper(const SceneOf<Dim>& scene)
       : scene_(scene),
-        force_(3, scene.body.node_count()),
-        impulse_(Eigen::Matrix3Xd::Zero(3, scene.contact_points.count())),
+        force_(Dim, scene.body.node_count()),
+        impulse_(PointsOf<Dim>::Zero(Dim, scene.contact_points.count())),
         inverse_mass_(scene.body.mass.cwiseInverse()),
         point_inverse_mass_(scene.contact_points.count()) {
     mode_at_rest_ = stiffest_mode_at_rest(scene.body);
     stiffest_volume_at_rest_ = stiffest_volume(scene.body, scene.body.rest, inverse_mass_);
-    const ContactPoints& points = scene.contact_points;
+    const ContactPointsOf<Dim>& points = scene.contact_points;
     for (int p = 0; p < points.count(); ++p) {
       point_inverse_mass_[p] = 0;
-      for (int k = 0; k < 4; ++k) {
+      for (int k = 0; k <= Dim; ++k) {
         point_inverse_mass_[p] += points.weights(k, p) * points.weights(k, p) * inverse_mass_[points.nodes(k, p)];
       }
     }
@@ -94,8 +98,8 @@ class ExplicitStepper final : public Stepper {
 
   double substep(double dt) const override { return dt / std::ceil(dt / (kStepMargin * longest_substep(mode_at_rest_))); }
 
-  Termination step(double dt, const Eigen::VectorXd& activation, const Eigen::Matrix3Xd* effect_force, State& state,
-                   Impulses& impulses) override {
+  Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
+                   ImpulsesOf<Dim>& impulses) override {
     start_ = state;
     // The bound at rest, shortened by as much as the shape from which the step starts is stiffer.
     StiffestMode mode = mode_at_rest_;
@@ -118,7 +122,7 @@ class ExplicitStepper final : public Stepper {
         force_ += *effect_force;
         impulses.effect_nodes += h * *effect_force;
         for (int i = 0; i < scene_.body.node_count(); ++i) {
-          impulses.effect_moment += h * state.x.col(i).cross(effect_force->col(i));
+          impulses.effect_moment += h * cross<Dim>(state.x.col(i), effect_force->col(i));
         }
       }
       double fastest = 0;
@@ -127,7 +131,7 @@ class ExplicitStepper final : public Stepper {
         const double speed_squared = state.v.col(i).squaredNorm();
         if (!(speed_squared <= fastest)) fastest = speed_squared;  // keeps what is not a number
       }
-      impulses.gravity_moment += h * (state.x * scene_.body.mass).cross(scene_.gravity);
+      impulses.gravity_moment += h * cross<Dim>(state.x * scene_.body.mass, scene_.gravity);
       const double farthest = h * std::sqrt(fastest);
       if (!(farthest < shortest_edge_)) {
         state = start_;
@@ -144,13 +148,13 @@ class ExplicitStepper final : public Stepper {
   }
 
  private:
-  double gap(const ConstPoints& x, int p) const {
+  double gap(const ConstPointsOf<Dim>& x, int p) const {
     return scene_.ground.normal.dot(scene_.contact_points.of(x, p)) - scene_.ground.offset;
   }
 
   /// The points that may touch the ground in this substep, in which no node moves farther than `farthest` [m], and in some
   /// to come; what is left for those is returned [m].
-  double find_candidates(double farthest, const State& state) {
+  double find_candidates(double farthest, const StateOf<Dim>& state) {
     const double reach = kReach * shortest_edge_;
     candidates_.clear();
     for (int p = 0; p < scene_.contact_points.count(); ++p) {
@@ -163,17 +167,17 @@ class ExplicitStepper final : public Stepper {
     return reach;
   }
 
-  void apply(int p, const Eigen::Vector3d& impulse, State& state) const {
-    const ContactPoints& points = scene_.contact_points;
-    for (int k = 0; k < 4; ++k) {
+  void apply(int p, const VectorOf<Dim>& impulse, StateOf<Dim>& state) const {
+    const ContactPointsOf<Dim>& points = scene_.contact_points;
+    for (int k = 0; k <= Dim; ++k) {
       const int i = points.nodes(k, p);
       state.v.col(i) += (points.weights(k, p) * inverse_mass_[i]) * impulse;
     }
   }
 
-  void push_apart(double h, State& state, Impulses& impulses) {
-    const ContactPoints& points = scene_.contact_points;
-    const Eigen::Vector3d normal = scene_.ground.normal;
+  void push_apart(double h, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
+    const ContactPointsOf<Dim>& points = scene_.contact_points;
+    const VectorOf<Dim> normal = scene_.ground.normal;
     active_.clear();
     for (const int p : candidates_) {
       const double distance = gap(state.x, p);
@@ -186,17 +190,17 @@ class ExplicitStepper final : public Stepper {
       double change = 0;
       for (const Active& contact : active_) {
         const int p = contact.point;
-        const Eigen::Vector3d velocity = points.of(state.v, p);
-        Eigen::Vector3d wanted = impulse_.col(p);
+        const VectorOf<Dim> velocity = points.of(state.v, p);
+        VectorOf<Dim> wanted = impulse_.col(p);
         const double normal_velocity = normal.dot(velocity);
         const double normal_impulse =
             std::max(0.0, normal.dot(wanted) + (contact.least_velocity - normal_velocity) / point_inverse_mass_[p]);
-        Eigen::Vector3d tangential =
+        VectorOf<Dim> tangential =
             wanted - normal.dot(wanted) * normal - (velocity - normal_velocity * normal) / point_inverse_mass_[p];
         const double limit = scene_.ground.friction * normal_impulse, size = tangential.norm();
         if (size > limit) tangential *= limit / size;
         wanted = normal_impulse * normal + tangential;
-        const Eigen::Vector3d step = wanted - impulse_.col(p);
+        const VectorOf<Dim> step = wanted - impulse_.col(p);
         change = std::max(change, step.norm() * point_inverse_mass_[p]);
         impulse_.col(p) = wanted;
         apply(p, step, state);
@@ -206,11 +210,11 @@ class ExplicitStepper final : public Stepper {
     for (const Active& contact : active_) {
       const int p = contact.point;
       impulses.contact.col(p) += impulse_.col(p);
-      for (int k = 0; k < 4; ++k) {
+      for (int k = 0; k <= Dim; ++k) {
         impulses.contact_nodes.col(points.nodes(k, p)) += points.weights(k, p) * impulse_.col(p);
       }
-      const Eigen::Vector3d place = points.of(state.x, p), impulse = impulse_.col(p);
-      impulses.contact_moment += place.cross(impulse);
+      const VectorOf<Dim> place = points.of(state.x, p), impulse = impulse_.col(p);
+      impulses.contact_moment += cross<Dim>(place, impulse);
     }
   }
 
@@ -219,10 +223,10 @@ class ExplicitStepper final : public Stepper {
     double least_velocity;  // [m/s] along the normal
   };
 
-  const Scene& scene_;
-  Eigen::Matrix3Xd force_, impulse_;  // [N], [N s] of the last substep
+  const SceneOf<Dim>& scene_;
+  PointsOf<Dim> force_, impulse_;  // [N], [N s] of the last substep
   Eigen::VectorXd inverse_mass_, point_inverse_mass_;
-  State start_;
+  StateOf<Dim> start_;
   StiffestMode mode_at_rest_{};         // of the body at rest
   double stiffest_volume_at_rest_ = 0;  // [1/s2]
   double shortest_edge_ = 0;            // [m]
@@ -232,6 +236,11 @@ class ExplicitStepper final : public Stepper {
 
 }  // namespace
 
-std::unique_ptr<Stepper> make_explicit_stepper(const Scene& scene) { return std::make_unique<ExplicitStepper>(scene); }
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene) {
+  return std::make_unique<ExplicitStepper<Dim>>(scene);
+}
+template std::unique_ptr<StepperOf<2>> make_explicit_stepper<2>(const SceneOf<2>&);
+template std::unique_ptr<StepperOf<3>> make_explicit_stepper<3>(const SceneOf<3>&);
 
 }  // namespace hydrostat::physics

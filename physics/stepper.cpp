@@ -12,7 +12,8 @@ std::string name_of(Method method) {
   return {};
 }
 
-std::unique_ptr<Stepper> make_stepper(Method method, const Scene& scene) {
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene) {
   switch (method) {
     case Method::kExplicit:
       return make_explicit_stepper(scene);
@@ -22,12 +23,20 @@ std::unique_ptr<Stepper> make_stepper(Method method, const Scene& scene) {
   return nullptr;
 }
 
-Impulses make_impulses(const Scene& scene) {
-  Impulses impulses;
-  impulses.contact = Eigen::Matrix3Xd::Zero(3, scene.contact_points.count());
-  impulses.contact_nodes = impulses.effect_nodes = Eigen::Matrix3Xd::Zero(3, scene.body.node_count());
-  impulses.contact_moment = impulses.effect_moment = impulses.gravity_moment = Eigen::Vector3d::Zero();
+template <int Dim>
+ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene) {
+  ImpulsesOf<Dim> impulses;
+  impulses.contact = PointsOf<Dim>::Zero(Dim, scene.contact_points.count());
+  impulses.contact_nodes = impulses.effect_nodes = PointsOf<Dim>::Zero(Dim, scene.body.node_count());
+  impulses.contact_moment = impulses.effect_moment = impulses.gravity_moment = SpinOf<Dim>::Zero();
   return impulses;
 }
+
+#define HYDROSTAT_INSTANTIATE(Dim)                                                         \
+  template std::unique_ptr<StepperOf<Dim>> make_stepper<Dim>(Method, const SceneOf<Dim>&); \
+  template ImpulsesOf<Dim> make_impulses<Dim>(const SceneOf<Dim>&);
+HYDROSTAT_INSTANTIATE(2)
+HYDROSTAT_INSTANTIATE(3)
+#undef HYDROSTAT_INSTANTIATE
 
 }  // namespace hydrostat::physics

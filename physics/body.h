@@ -42,8 +42,9 @@ BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 
 
 template <int Dim>
 struct StateOf {
-  PointsOf<Dim> x;  // [m] Dim x N
-  PointsOf<Dim> v;  // [m/s] Dim x N
+  PointsOf<Dim> x;                     // [m] Dim x N
+  PointsOf<Dim> v;                     // [m/s] Dim x N
+  PointsOf<Dim> obstacle_travel = {};  // [m] Dim x the scene's obstacles: from where the scene has them; empty: none moved
 };
 using State = StateOf<3>;
 

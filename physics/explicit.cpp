@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "physics/elastic_forces.h"
+#include "physics/impulse_contact.h"
 #include "physics/stepper.h"
 #include "physics/system_matrix.h"
 
@@ -10,10 +11,6 @@ namespace {
 
 constexpr double kStepMargin = 0.8;    // of the linear stability bound
 constexpr double kMostSubsteps = 1e5;  // of a step: a shape that wants more has run away
-constexpr double kPushOutSpeed = 0.5;  // [m/s] at most, with which a point that starts below the ground is lifted
-constexpr double kReach = 0.1;         // of the shortest edge [-]: points as near as that are watched
-constexpr int kContactSweeps = 30;
-constexpr double kContactTolerance = 1e-7;  // [m/s] change of a contact point's velocity in a sweep
 
 struct StiffestMode {
   double damping;            // [1/s]
@@ -77,22 +74,9 @@ template <int Dim>
 class ExplicitStepper final : public StepperOf<Dim> {
  public:
   explicit ExplicitStepper(const SceneOf<Dim>& scene)
-      : scene_(scene),
-        force_(Dim, scene.body.node_count()),
-        impulse_(PointsOf<Dim>::Zero(Dim, scene.contact_points.count())),
-        inverse_mass_(scene.body.mass.cwiseInverse()),
-        point_inverse_mass_(scene.contact_points.count()) {
+      : scene_(scene), force_(Dim, scene.body.node_count()), inverse_mass_(scene.body.mass.cwiseInverse()), contact_(scene) {
     mode_at_rest_ = stiffest_mode_at_rest(scene.body);
-    stiffest_volume_at_rest_ = stiffest_volume(scene.body, scene.body.rest, inverse_mass_);
-    const ContactPointsOf<Dim>& points = scene.contact_points;
-    for (int p = 0; p < points.count(); ++p) {
-      point_inverse_mass_[p] = 0;
-      for (int k = 0; k <= Dim; ++k) {
-        point_inverse_mass_[p] += points.weights(k, p) * points.weights(k, p) * inverse_mass_[points.nodes(k, p)];
-      }
-    }
-    candidates_.reserve(static_cast<std::size_t>(points.count()));
-    active_.reserve(static_cast<std::size_t>(points.count()));
+    stiffest_volume_at_rest_ = stiffest_volume<Dim>(scene.body, scene.body.rest, inverse_mass_);
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
 
@@ -108,13 +92,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
     if (!(count <= kMostSubsteps)) return Termination::kDiverged;
     const int substeps = static_cast<int>(count);
     const double h = dt / substeps;
-    impulses.contact.setZero();
-    impulses.contact_nodes.setZero();
-    impulses.contact_moment.setZero();
-    impulses.effect_nodes.setZero();
-    impulses.effect_moment.setZero();
-    impulses.gravity_moment.setZero();
-    double reach = 0;  // [m] that the body may still move before points beyond the candidates can touch
+    clear(impulses);
+    contact_.forget_reach();
     for (int s = 0; s < substeps; ++s) {
       force_.setZero();
       add_internal_forces(scene_.body, state, activation, force_);
@@ -137,101 +116,21 @@ class ExplicitStepper final : public StepperOf<Dim> {
         state = start_;
         return Termination::kDiverged;
       }
-      if (scene_.has_ground) {
-        reach -= 2 * farthest + h * kPushOutSpeed;  // what contact itself may add is within that
-        if (reach < 0) reach = find_candidates(2 * farthest + h * kPushOutSpeed, state);
-        push_apart(h, state, impulses);
-      }
+      if (contact_.is_needed()) contact_.push_apart(h, std::sqrt(fastest), state, impulses);
       state.x += h * state.v;
     }
     return Termination::kDone;
   }
 
  private:
-  double gap(const ConstPointsOf<Dim>& x, int p) const {
-    return scene_.ground.normal.dot(scene_.contact_points.of(x, p)) - scene_.ground.offset;
-  }
-
-  /// The points that may touch the ground in this substep, in which no node moves farther than `farthest` [m], and in some
-  /// to come; what is left for those is returned [m].
-  double find_candidates(double farthest, const StateOf<Dim>& state) {
-    const double reach = kReach * shortest_edge_;
-    candidates_.clear();
-    for (int p = 0; p < scene_.contact_points.count(); ++p) {
-      if (gap(state.x, p) < reach + farthest) {
-        candidates_.push_back(p);
-      } else {
-        impulse_.col(p).setZero();
-      }
-    }
-    return reach;
-  }
-
-  void apply(int p, const VectorOf<Dim>& impulse, StateOf<Dim>& state) const {
-    const ContactPointsOf<Dim>& points = scene_.contact_points;
-    for (int k = 0; k <= Dim; ++k) {
-      const int i = points.nodes(k, p);
-      state.v.col(i) += (points.weights(k, p) * inverse_mass_[i]) * impulse;
-    }
-  }
-
-  void push_apart(double h, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
-    const ContactPointsOf<Dim>& points = scene_.contact_points;
-    const VectorOf<Dim> normal = scene_.ground.normal;
-    active_.clear();
-    for (const int p : candidates_) {
-      const double distance = gap(state.x, p);
-      if (distance + h * normal.dot(points.of(state.v, p)) < 0 || impulse_.col(p).squaredNorm() > 0) {
-        active_.push_back({p, std::min(-distance / h, kPushOutSpeed)});
-        apply(p, impulse_.col(p), state);  // warm start
-      }
-    }
-    for (int sweep = 0; sweep < kContactSweeps; ++sweep) {
-      double change = 0;
-      for (const Active& contact : active_) {
-        const int p = contact.point;
-        const VectorOf<Dim> velocity = points.of(state.v, p);
-        VectorOf<Dim> wanted = impulse_.col(p);
-        const double normal_velocity = normal.dot(velocity);
-        const double normal_impulse =
-            std::max(0.0, normal.dot(wanted) + (contact.least_velocity - normal_velocity) / point_inverse_mass_[p]);
-        VectorOf<Dim> tangential =
-            wanted - normal.dot(wanted) * normal - (velocity - normal_velocity * normal) / point_inverse_mass_[p];
-        const double limit = scene_.ground.friction * normal_impulse, size = tangential.norm();
-        if (size > limit) tangential *= limit / size;
-        wanted = normal_impulse * normal + tangential;
-        const VectorOf<Dim> step = wanted - impulse_.col(p);
-        change = std::max(change, step.norm() * point_inverse_mass_[p]);
-        impulse_.col(p) = wanted;
-        apply(p, step, state);
-      }
-      if (change < kContactTolerance) break;
-    }
-    for (const Active& contact : active_) {
-      const int p = contact.point;
-      impulses.contact.col(p) += impulse_.col(p);
-      for (int k = 0; k <= Dim; ++k) {
-        impulses.contact_nodes.col(points.nodes(k, p)) += points.weights(k, p) * impulse_.col(p);
-      }
-      const VectorOf<Dim> place = points.of(state.x, p), impulse = impulse_.col(p);
-      impulses.contact_moment += cross<Dim>(place, impulse);
-    }
-  }
-
-  struct Active {
-    int point;
-    double least_velocity;  // [m/s] along the normal
-  };
-
   const SceneOf<Dim>& scene_;
-  PointsOf<Dim> force_, impulse_;  // [N], [N s] of the last substep
-  Eigen::VectorXd inverse_mass_, point_inverse_mass_;
+  PointsOf<Dim> force_;  // [N]
+  Eigen::VectorXd inverse_mass_;
+  ImpulseContact<Dim> contact_;
   StateOf<Dim> start_;
   StiffestMode mode_at_rest_{};         // of the body at rest
   double stiffest_volume_at_rest_ = 0;  // [1/s2]
   double shortest_edge_ = 0;            // [m]
-  std::vector<int> candidates_;
-  std::vector<Active> active_;
 };
 
 }  // namespace

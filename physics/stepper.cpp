@@ -23,20 +23,7 @@ std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& 
   return nullptr;
 }
 
-template <int Dim>
-ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene) {
-  ImpulsesOf<Dim> impulses;
-  impulses.contact = PointsOf<Dim>::Zero(Dim, scene.contact_points.count());
-  impulses.contact_nodes = impulses.effect_nodes = PointsOf<Dim>::Zero(Dim, scene.body.node_count());
-  impulses.contact_moment = impulses.effect_moment = impulses.gravity_moment = SpinOf<Dim>::Zero();
-  return impulses;
-}
-
-#define HYDROSTAT_INSTANTIATE(Dim)                                                         \
-  template std::unique_ptr<StepperOf<Dim>> make_stepper<Dim>(Method, const SceneOf<Dim>&); \
-  template ImpulsesOf<Dim> make_impulses<Dim>(const SceneOf<Dim>&);
-HYDROSTAT_INSTANTIATE(2)
-HYDROSTAT_INSTANTIATE(3)
-#undef HYDROSTAT_INSTANTIATE
+template std::unique_ptr<StepperOf<2>> make_stepper<2>(Method, const SceneOf<2>&);
+template std::unique_ptr<StepperOf<3>> make_stepper<3>(Method, const SceneOf<3>&);
 
 }  // namespace hydrostat::physics

@@ -3,32 +3,9 @@
 #include <memory>
 #include <string>
 
-#include "physics/contact.h"
+#include "physics/scene.h"
 
 namespace hydrostat::physics {
-
-/// What acts on the body: nothing else does.
-template <int Dim>
-struct SceneOf {
-  BodyOf<Dim> body;
-  ContactPointsOf<Dim> contact_points;
-  GroundOf<Dim> ground;
-  bool has_ground = true;
-  VectorOf<Dim> gravity = -9.81 * VectorOf<Dim>::UnitY();  // [m/s2]
-};
-using Scene = SceneOf<3>;
-
-/// The impulses of one step [N s], with which the momentum of the body balances.
-template <int Dim>
-struct ImpulsesOf {
-  PointsOf<Dim> contact;        // Dim x P, by the ground on each contact point
-  PointsOf<Dim> contact_nodes;  // Dim x N, the same spread on the nodes
-  SpinOf<Dim> contact_moment;   // [N m s] about the world's origin
-  PointsOf<Dim> effect_nodes;   // Dim x N, declared effects (pushes)
-  SpinOf<Dim> effect_moment;    // [N m s]
-  SpinOf<Dim> gravity_moment;   // [N m s]
-};
-using Impulses = ImpulsesOf<3>;
 
 enum class Termination { kDone, kDiverged };
 
@@ -56,8 +33,5 @@ template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene);
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_euler_stepper(const SceneOf<Dim>& scene);
-
-template <int Dim>
-ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene);
 
 }  // namespace hydrostat::physics

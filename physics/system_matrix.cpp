@@ -138,7 +138,8 @@ template <int Dim>
 int SystemMatrixOf<Dim>::edge_between(int low, int high) const {
   const auto begin = edge_high_.begin() + edge_begin_[static_cast<std::size_t>(low)];
   const auto end = edge_high_.begin() + edge_begin_[static_cast<std::size_t>(low) + 1];
-  return static_cast<int>(std::lower_bound(begin, end, high) - edge_high_.begin());
+  const auto at = std::lower_bound(begin, end, high);
+  return at == end || *at != high ? -1 : static_cast<int>(at - edge_high_.begin());
 }
 
 template <int Dim>
@@ -198,16 +199,25 @@ void SystemMatrixOf<Dim>::add_damping(const BodyOf<Dim>& body, const ConstPoints
 
 template <int Dim>
 void SystemMatrixOf<Dim>::add_contact(const ContactPointsOf<Dim>& points, int p, const BlockOf<Dim>& block) {
-  for (int a = 0; a <= Dim; ++a) {
-    const int i = points.nodes(a, p);
-    const double wa = points.weights(a, p);
-    if (wa == 0) continue;
-    add_diagonal(i, (wa * wa) * block);
-    for (int b = a + 1; b <= Dim; ++b) {
-      const double weight = wa * points.weights(b, p);
+  add_contact(Dim + 1, points.nodes.col(p).data(), points.weights.col(p).data(), block);
+}
+
+template <int Dim>
+void SystemMatrixOf<Dim>::add_contact(int count, const int* nodes, const double* weights, const BlockOf<Dim>& block) {
+  for (int a = 0; a < count; ++a) {
+    if (weights[a] == 0) continue;
+    add_diagonal(nodes[a], (weights[a] * weights[a]) * block);
+    for (int b = a + 1; b < count; ++b) {
+      const double weight = weights[a] * weights[b];
       if (weight == 0) continue;
-      const auto [low, high] = std::minmax(i, points.nodes(b, p));
-      add_off_diagonal(edge_between(low, high), weight * block);
+      const auto [low, high] = std::minmax(nodes[a], nodes[b]);
+      const int edge = edge_between(low, high);
+      if (edge >= 0) {
+        add_off_diagonal(edge, weight * block);
+      } else {
+        add_diagonal(low, weight * block);
+        add_diagonal(high, weight * block);
+      }
     }
   }
 }

@@ -24,6 +24,9 @@ class SystemMatrixOf {
   void add_damping(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, double factor);
   /// Adds w_i w_j * block for the nodes i, j of contact point p; block is symmetric.
   void add_contact(const ContactPointsOf<Dim>& points, int p, const BlockOf<Dim>& block);
+  /// The same for `count` nodes and weights >= 0. What couples two nodes without an edge has no place in the matrix and goes
+  /// to their diagonals, which makes the matrix larger, never less positive.
+  void add_contact(int count, const int* nodes, const double* weights, const BlockOf<Dim>& block);
 
   /// Factors the matrix into block L D L^T, up-looking, on the pattern that the constructor found; nothing is allocated.
   /// False: not positive definite.
@@ -38,7 +41,7 @@ class SystemMatrixOf {
   void find_factor_pattern(const BodyOf<Dim>& body);
   void add_off_diagonal(int edge, const BlockOf<Dim>& block);
   void add_diagonal(int node, const BlockOf<Dim>& block);
-  int edge_between(int low, int high) const;
+  int edge_between(int low, int high) const;  // -1 for none
 
   Eigen::SparseMatrix<double> matrix_;
   Eigen::Matrix<int, Dim, Eigen::Dynamic> diagonal_slot_;  // Dim x N: where rows c.. of column Dim i + c begin

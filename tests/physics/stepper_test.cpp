@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstring>
 
-#include "tests/physics/lattice_scene.h"
+#include "tests/physics/method_cases.h"
 
 namespace {
 std::atomic<long> allocations = 0;  // of this program: Eigen's by malloc and the library's by new, which the linker wraps
@@ -41,12 +41,6 @@ double deepest(const SceneOf<Dim>& scene, const StateOf<Dim>& state) {
   return depth;
 }
 
-template <int D, Method M>
-struct Case {
-  static constexpr int kDim = D;
-  static constexpr Method kMethod = M;
-};
-
 /// What every method has to keep in both dimensions, whatever the scene.
 template <typename Case>
 class Steppers : public testing::Test {
@@ -73,14 +67,6 @@ class Steppers : public testing::Test {
   }
 };
 
-struct CaseName {
-  template <typename Type>
-  static std::string GetName(int) {
-    return name_of(Type::kMethod) + std::to_string(Type::kDim) + "d";
-  }
-};
-using Cases =
-    testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>>;
 TYPED_TEST_SUITE(Steppers, Cases, CaseName);
 
 TYPED_TEST(Steppers, StayAtRestInTheRestShape) {

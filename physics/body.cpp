@@ -1,6 +1,5 @@
 #include "physics/body.h"
 
-#include <Eigen/Geometry>
 #include <cassert>
 #include <map>
 #include <utility>
@@ -8,27 +7,32 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr int kTetEdge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-
-double tet_volume(const ConstPoints& x, const Eigen::Vector4i& tet) {
-  const Eigen::Vector3d a = x.col(tet[1]) - x.col(tet[0]);
-  const Eigen::Vector3d b = x.col(tet[2]) - x.col(tet[0]);
-  const Eigen::Vector3d c = x.col(tet[3]) - x.col(tet[0]);
-  return a.dot(b.cross(c)) / 6;
+template <int Dim>
+double tet_volume(const ConstPointsOf<Dim>& x, const Eigen::Matrix<int, Dim + 1, 1>& tet) {
+  const VectorOf<Dim> a = x.col(tet[1]) - x.col(tet[0]);
+  const VectorOf<Dim> b = x.col(tet[2]) - x.col(tet[0]);
+  if constexpr (Dim == 3) {
+    const VectorOf<Dim> c = x.col(tet[3]) - x.col(tet[0]);
+    return a.dot(b.cross(c)) / kSimplexFactor<Dim>;
+  } else {
+    return cross<Dim>(a, b)[0] / kSimplexFactor<Dim>;
+  }
 }
 
 }  // namespace
 
-Body make_body(const Eigen::Matrix3Xd& rest, const Eigen::Matrix4Xi& tets, const Eigen::Matrix2Xi& edges,
-               const Eigen::VectorXd& fill, const Material& material) {
-  Body body;
+template <int Dim>
+BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>& tets,
+                      const Eigen::Matrix2Xi& edges, const Eigen::VectorXd& fill, const Material& material) {
+  constexpr int kEdges = kEdgesPerTet<Dim>;
+  BodyOf<Dim> body;
   body.rest = rest;
   body.tets = tets;
   body.edges = edges;
   body.mass = Eigen::VectorXd::Zero(rest.cols());
   body.rest_volume.resize(tets.cols());
   body.volume_stiffness.resize(tets.cols());
-  body.tet_edges.resize(6, tets.cols());
+  body.tet_edges.resize(kEdges, tets.cols());
   body.rest_length.resize(edges.cols());
   std::map<std::pair<int, int>, int> edge_of;
   for (int e = 0; e < edges.cols(); ++e) {
@@ -37,57 +41,90 @@ Body make_body(const Eigen::Matrix3Xd& rest, const Eigen::Matrix4Xi& tets, const
   }
   Eigen::VectorXd edge_volume = Eigen::VectorXd::Zero(edges.cols());
   for (int t = 0; t < tets.cols(); ++t) {
-    const double volume = tet_volume(rest, tets.col(t));
+    const double volume = tet_volume<Dim>(rest, tets.col(t));
     assert(volume > 0);
     const double filled = volume * fill[t];
     body.rest_volume[t] = volume;
     body.volume_stiffness[t] = material.bulk_factor * material.youngs_modulus * filled;
-    for (int k = 0; k < 4; ++k) body.mass[tets(k, t)] += material.density * filled / 4;
-    for (int k = 0; k < 6; ++k) {
-      const auto [low, high] = std::minmax(tets(kTetEdge[k][0], t), tets(kTetEdge[k][1], t));
-      const int e = edge_of.at({low, high});
-      body.tet_edges(k, t) = e;
-      edge_volume[e] += filled / 6;
+    for (int k = 0; k <= Dim; ++k) body.mass[tets(k, t)] += material.density * filled / (Dim + 1);
+    for (int a = 0, k = 0; a <= Dim; ++a) {
+      for (int b = a + 1; b <= Dim; ++b, ++k) {
+        const auto [low, high] = std::minmax(tets(a, t), tets(b, t));
+        const int e = edge_of.at({low, high});
+        body.tet_edges(k, t) = e;
+        edge_volume[e] += filled / kEdges;
+      }
     }
   }
-  body.edge_stiffness = 6 * material.youngs_modulus * edge_volume.array() / body.rest_length.array().square();
+  body.edge_stiffness = kEdges * material.youngs_modulus * edge_volume.array() / body.rest_length.array().square();
   body.edge_damping = material.damping_time * body.edge_stiffness;
   return body;
 }
 
-Eigen::Vector3d centre_of_mass(const Body& body, const ConstPoints& x) { return x * body.mass / body.mass.sum(); }
+template <int Dim>
+VectorOf<Dim> centre_of_mass(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x) {
+  return x * body.mass / body.mass.sum();
+}
 
-Eigen::Vector3d momentum(const Body& body, const ConstPoints& v) { return v * body.mass; }
+template <int Dim>
+VectorOf<Dim> momentum(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& v) {
+  return v * body.mass;
+}
 
-Eigen::Vector3d angular_momentum(const Body& body, const ConstPoints& x, const ConstPoints& v,
-                                 const Eigen::Vector3d& about) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+template <int Dim>
+SpinOf<Dim> angular_momentum(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& v,
+                             const std::type_identity_t<VectorOf<Dim>>& about) {
+  SpinOf<Dim> sum = SpinOf<Dim>::Zero();
   for (int i = 0; i < body.node_count(); ++i) {
-    const Eigen::Vector3d arm = x.col(i) - about, momentum_of_node = body.mass[i] * v.col(i);
-    sum += arm.cross(momentum_of_node);
+    const VectorOf<Dim> arm = x.col(i) - about, momentum_of_node = body.mass[i] * v.col(i);
+    sum += cross<Dim>(arm, momentum_of_node);
   }
   return sum;
 }
 
-Eigen::Matrix3d inertia(const Body& body, const ConstPoints& x, const Eigen::Vector3d& about) {
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+template <int Dim>
+InertiaOf<Dim> inertia(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x,
+                       const std::type_identity_t<VectorOf<Dim>>& about) {
+  InertiaOf<Dim> sum = InertiaOf<Dim>::Zero();
   for (int i = 0; i < body.node_count(); ++i) {
-    const Eigen::Vector3d arm = x.col(i) - about;
-    sum += body.mass[i] * (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
+    const VectorOf<Dim> arm = x.col(i) - about;
+    if constexpr (Dim == 3) {
+      sum += body.mass[i] * (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
+    } else {
+      sum(0, 0) += body.mass[i] * arm.squaredNorm();
+    }
   }
   return sum;
 }
 
-double volume(const Body& body, const ConstPoints& x) {
+template <int Dim>
+double volume(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x) {
   double sum = 0;
-  for (int t = 0; t < body.tet_count(); ++t) sum += tet_volume(x, body.tets.col(t));
+  for (int t = 0; t < body.tet_count(); ++t) sum += tet_volume<Dim>(x, body.tets.col(t));
   return sum;
 }
 
-Eigen::VectorXd jacobians(const Body& body, const ConstPoints& x) {
+template <int Dim>
+Eigen::VectorXd jacobians(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x) {
   Eigen::VectorXd jacobian(body.tet_count());
-  for (int t = 0; t < body.tet_count(); ++t) jacobian[t] = tet_volume(x, body.tets.col(t)) / body.rest_volume[t];
+  for (int t = 0; t < body.tet_count(); ++t) jacobian[t] = tet_volume<Dim>(x, body.tets.col(t)) / body.rest_volume[t];
   return jacobian;
 }
+
+#define HYDROSTAT_INSTANTIATE(Dim)                                                                                     \
+  template BodyOf<Dim> make_body<Dim>(const Eigen::Matrix<double, Dim, Eigen::Dynamic>&,                               \
+                                      const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>&, const Eigen::Matrix2Xi&,     \
+                                      const Eigen::VectorXd&, const Material&);                                        \
+  template VectorOf<Dim> centre_of_mass<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);                           \
+  template VectorOf<Dim> momentum<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);                                 \
+  template SpinOf<Dim> angular_momentum<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const ConstPointsOf<Dim>&, \
+                                             const std::type_identity_t<VectorOf<Dim>>&);                              \
+  template InertiaOf<Dim> inertia<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&,                                  \
+                                       const std::type_identity_t<VectorOf<Dim>>&);                                    \
+  template double volume<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);                                          \
+  template Eigen::VectorXd jacobians<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);
+HYDROSTAT_INSTANTIATE(2)
+HYDROSTAT_INSTANTIATE(3)
+#undef HYDROSTAT_INSTANTIATE
 
 }  // namespace hydrostat::physics

@@ -1,27 +1,29 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <vector>
+#include "physics/dimension.h"
 
 namespace hydrostat::physics {
 
 /// A soft body: springs along the edges of a tetrahedral mesh, whose rest lengths are commanded, and volume per tet.
-struct Body {
-  Eigen::Matrix3Xd rest;                            // rest positions [m] 3 x N
-  Eigen::VectorXd mass;                             // [kg] N, > 0
-  Eigen::Matrix2Xi edges;                           // 2 x E
-  Eigen::VectorXd rest_length;                      // [m] E, > 0
-  Eigen::VectorXd edge_stiffness;                   // [N/m] E
-  Eigen::VectorXd edge_damping;                     // [N s/m] E, axial dashpot
-  Eigen::Matrix4Xi tets;                            // 4 x T, positive volume at rest
-  Eigen::Matrix<int, 6, Eigen::Dynamic> tet_edges;  // 6 x T: the edges 01 02 03 12 13 23 of the tet
-  Eigen::VectorXd rest_volume;                      // [m3] T, of the whole tet
-  Eigen::VectorXd volume_stiffness;                 // [J] T: kappa times the filled volume
+/// In 2D a tet is a triangle, its volume the area times one metre of depth.
+template <int Dim>
+struct BodyOf {
+  PointsOf<Dim> rest;                                               // rest positions [m] Dim x N
+  Eigen::VectorXd mass;                                             // [kg] N, > 0
+  Eigen::Matrix2Xi edges;                                           // 2 x E
+  Eigen::VectorXd rest_length;                                      // [m] E, > 0
+  Eigen::VectorXd edge_stiffness;                                   // [N/m] E
+  Eigen::VectorXd edge_damping;                                     // [N s/m] E, axial dashpot
+  Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> tets;                 // Dim + 1 x T, positive volume at rest
+  Eigen::Matrix<int, kEdgesPerTet<Dim>, Eigen::Dynamic> tet_edges;  // x T: the edges 01 02 03 12 13 23 (01 02 12) of the tet
+  Eigen::VectorXd rest_volume;                                      // [m3] T, of the whole tet
+  Eigen::VectorXd volume_stiffness;                                 // [J] T: kappa times the filled volume
 
   int node_count() const { return static_cast<int>(mass.size()); }
   int edge_count() const { return static_cast<int>(rest_length.size()); }
   int tet_count() const { return static_cast<int>(rest_volume.size()); }
 };
+using Body = BodyOf<3>;
 
 struct Material {
   double density = 1000;        // [kg/m3]
@@ -31,25 +33,36 @@ struct Material {
 };
 
 /// The body of a tet mesh. `fill` [-] is the share of each tet that is matter: mass and stiffness follow it.
-/// Edge e gets k = 6 E V_e / l0^2 with V_e a sixth of the filled volume of the tets around it.
+/// Edge e gets k = n E V_e / l0^2 with V_e an n-th of the filled volume of the tets around it, n = 6 edges a tet (3 a
+/// triangle): a lattice of such springs has Young's modulus E and the Poisson's ratio of central forces, 1/4 (1/3).
 /// `edges` must hold every edge of `tets` once, lower node first, in lexicographic order.
-Body make_body(const Eigen::Matrix3Xd& rest, const Eigen::Matrix4Xi& tets, const Eigen::Matrix2Xi& edges,
-               const Eigen::VectorXd& fill, const Material& material);
+template <int Dim>
+BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>& tets,
+                      const Eigen::Matrix2Xi& edges, const Eigen::VectorXd& fill, const Material& material);
 
-struct State {
-  Eigen::Matrix3Xd x;  // [m] 3 x N
-  Eigen::Matrix3Xd v;  // [m/s] 3 x N
+template <int Dim>
+struct StateOf {
+  PointsOf<Dim> x;                     // [m] Dim x N
+  PointsOf<Dim> v;                     // [m/s] Dim x N
+  PointsOf<Dim> obstacle_travel = {};  // [m] Dim x the scene's obstacles: from where the scene has them; empty: none moved
 };
+using State = StateOf<3>;
 
-using ConstPoints = Eigen::Ref<const Eigen::Matrix3Xd>;
-
-Eigen::Vector3d centre_of_mass(const Body& body, const ConstPoints& x);
-Eigen::Vector3d momentum(const Body& body, const ConstPoints& v);
+template <int Dim>
+VectorOf<Dim> centre_of_mass(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x);
+template <int Dim>
+VectorOf<Dim> momentum(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& v);
 /// About `about` [m]; kg m2/s.
-Eigen::Vector3d angular_momentum(const Body& body, const ConstPoints& x, const ConstPoints& v, const Eigen::Vector3d& about);
-Eigen::Matrix3d inertia(const Body& body, const ConstPoints& x, const Eigen::Vector3d& about);
-double volume(const Body& body, const ConstPoints& x);
+template <int Dim>
+SpinOf<Dim> angular_momentum(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& v,
+                             const std::type_identity_t<VectorOf<Dim>>& about);
+template <int Dim>
+InertiaOf<Dim> inertia(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x,
+                       const std::type_identity_t<VectorOf<Dim>>& about);
+template <int Dim>
+double volume(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x);
 /// det F of every tet [-]; T.
-Eigen::VectorXd jacobians(const Body& body, const ConstPoints& x);
+template <int Dim>
+Eigen::VectorXd jacobians(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x);
 
 }  // namespace hydrostat::physics

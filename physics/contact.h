@@ -5,22 +5,27 @@
 namespace hydrostat::physics {
 
 /// Points of the skin where contact is tested: point p is the sum over k of weights(k, p) * x(nodes(k, p)).
-struct ContactPoints {
-  Eigen::Matrix4Xi nodes;    // 4 x P
-  Eigen::Matrix4Xd weights;  // 4 x P, >= 0, sum 1
+template <int Dim>
+struct ContactPointsOf {
+  Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> nodes;       // Dim + 1 x P
+  Eigen::Matrix<double, Dim + 1, Eigen::Dynamic> weights;  // Dim + 1 x P, >= 0, sum 1
 
   int count() const { return static_cast<int>(nodes.cols()); }
-  Eigen::Vector3d of(const ConstPoints& nodal, int p) const {
-    return nodal.col(nodes(0, p)) * weights(0, p) + nodal.col(nodes(1, p)) * weights(1, p) +
-           nodal.col(nodes(2, p)) * weights(2, p) + nodal.col(nodes(3, p)) * weights(3, p);
+  VectorOf<Dim> of(const ConstPointsOf<Dim>& nodal, int p) const {
+    VectorOf<Dim> sum = nodal.col(nodes(0, p)) * weights(0, p);
+    for (int k = 1; k <= Dim; ++k) sum += nodal.col(nodes(k, p)) * weights(k, p);
+    return sum;
   }
 };
+using ContactPoints = ContactPointsOf<3>;
 
 /// The half space normal . x >= offset is free.
-struct Ground {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitY();
+template <int Dim>
+struct GroundOf {
+  VectorOf<Dim> normal = VectorOf<Dim>::UnitY();
   double offset = 0;      // [m]
   double friction = 0.8;  // Coulomb's coefficient [-]
 };
+using Ground = GroundOf<3>;
 
 }  // namespace hydrostat::physics

@@ -12,7 +12,8 @@ std::string name_of(Method method) {
   return {};
 }
 
-std::unique_ptr<Stepper> make_stepper(Method method, const Scene& scene) {
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene) {
   switch (method) {
     case Method::kExplicit:
       return make_explicit_stepper(scene);
@@ -22,12 +23,7 @@ std::unique_ptr<Stepper> make_stepper(Method method, const Scene& scene) {
   return nullptr;
 }
 
-Impulses make_impulses(const Scene& scene) {
-  Impulses impulses;
-  impulses.contact = Eigen::Matrix3Xd::Zero(3, scene.contact_points.count());
-  impulses.contact_nodes = impulses.effect_nodes = Eigen::Matrix3Xd::Zero(3, scene.body.node_count());
-  impulses.contact_moment = impulses.effect_moment = impulses.gravity_moment = Eigen::Vector3d::Zero();
-  return impulses;
-}
+template std::unique_ptr<StepperOf<2>> make_stepper<2>(Method, const SceneOf<2>&);
+template std::unique_ptr<StepperOf<3>> make_stepper<3>(Method, const SceneOf<3>&);
 
 }  // namespace hydrostat::physics

@@ -9,7 +9,8 @@
 
 namespace hydrostat::physics {
 
-SystemMatrix::SystemMatrix(const Body& body) {
+template <int Dim>
+SystemMatrixOf<Dim>::SystemMatrixOf(const BodyOf<Dim>& body) {
   const int nodes = body.node_count(), edges = body.edge_count();
   edge_begin_.assign(static_cast<std::size_t>(nodes) + 1, 0);
   for (int e = 0; e < edges; ++e) {
@@ -19,31 +20,31 @@ SystemMatrix::SystemMatrix(const Body& body) {
   }
   for (int i = 0; i < nodes; ++i) edge_begin_[static_cast<std::size_t>(i) + 1] += edge_begin_[static_cast<std::size_t>(i)];
 
-  matrix_.resize(3 * nodes, 3 * nodes);
-  Eigen::VectorXi per_column(3 * nodes);
+  matrix_.resize(Dim * nodes, Dim * nodes);
+  Eigen::VectorXi per_column(Dim * nodes);
   for (int i = 0; i < nodes; ++i) {
     const int neighbours = edge_begin_[static_cast<std::size_t>(i) + 1] - edge_begin_[static_cast<std::size_t>(i)];
-    for (int c = 0; c < 3; ++c) per_column[3 * i + c] = 3 - c + 3 * neighbours;
+    for (int c = 0; c < Dim; ++c) per_column[Dim * i + c] = Dim - c + Dim * neighbours;
   }
   matrix_.reserve(per_column);
   for (int i = 0; i < nodes; ++i) {
-    for (int c = 0; c < 3; ++c) {
-      for (int r = c; r < 3; ++r) matrix_.insert(3 * i + r, 3 * i + c) = 0;
+    for (int c = 0; c < Dim; ++c) {
+      for (int r = c; r < Dim; ++r) matrix_.insert(Dim * i + r, Dim * i + c) = 0;
       for (int e = edge_begin_[static_cast<std::size_t>(i)]; e < edge_begin_[static_cast<std::size_t>(i) + 1]; ++e) {
-        for (int r = 0; r < 3; ++r) matrix_.insert(3 * edge_high_[static_cast<std::size_t>(e)] + r, 3 * i + c) = 0;
+        for (int r = 0; r < Dim; ++r) matrix_.insert(Dim * edge_high_[static_cast<std::size_t>(e)] + r, Dim * i + c) = 0;
       }
     }
   }
   matrix_.makeCompressed();
-  diagonal_slot_.resize(3, nodes);
-  edge_slot_.resize(3, edges);
+  diagonal_slot_.resize(Dim, nodes);
+  edge_slot_.resize(Dim, edges);
   for (int i = 0; i < nodes; ++i) {
-    for (int c = 0; c < 3; ++c) {
-      int slot = matrix_.outerIndexPtr()[3 * i + c];
+    for (int c = 0; c < Dim; ++c) {
+      int slot = matrix_.outerIndexPtr()[Dim * i + c];
       diagonal_slot_(c, i) = slot;
-      slot += 3 - c;
+      slot += Dim - c;
       for (int e = edge_begin_[static_cast<std::size_t>(i)]; e < edge_begin_[static_cast<std::size_t>(i) + 1];
-           ++e, slot += 3) {
+           ++e, slot += Dim) {
         edge_slot_(c, e) = slot;
       }
     }
@@ -51,7 +52,8 @@ SystemMatrix::SystemMatrix(const Body& body) {
   find_factor_pattern(body);
 }
 
-void SystemMatrix::find_factor_pattern(const Body& body) {
+template <int Dim>
+void SystemMatrixOf<Dim>::find_factor_pattern(const BodyOf<Dim>& body) {
   const int nodes = body.node_count();
   std::vector<Eigen::Triplet<double>> links;
   for (int i = 0; i < nodes; ++i) links.emplace_back(i, i, 1);
@@ -108,48 +110,58 @@ void SystemMatrix::find_factor_pattern(const Body& body) {
   }
   l_.resize(row_.size());
   d_inverse_.resize(order_.size());
-  work_.assign(order_.size(), Eigen::Matrix3d::Zero());
+  work_.assign(order_.size(), BlockOf<Dim>::Zero());
 }
 
-void SystemMatrix::set_zero() { std::fill_n(matrix_.valuePtr(), matrix_.nonZeros(), 0.0); }
+template <int Dim>
+void SystemMatrixOf<Dim>::set_zero() {
+  std::fill_n(matrix_.valuePtr(), matrix_.nonZeros(), 0.0);
+}
 
-void SystemMatrix::add_diagonal(int node, const Eigen::Matrix3d& block) {
+template <int Dim>
+void SystemMatrixOf<Dim>::add_diagonal(int node, const BlockOf<Dim>& block) {
   double* const values = matrix_.valuePtr();
-  for (int c = 0; c < 3; ++c) {
-    for (int r = c; r < 3; ++r) values[diagonal_slot_(c, node) + r - c] += block(r, c);
+  for (int c = 0; c < Dim; ++c) {
+    for (int r = c; r < Dim; ++r) values[diagonal_slot_(c, node) + r - c] += block(r, c);
   }
 }
 
-void SystemMatrix::add_off_diagonal(int edge, const Eigen::Matrix3d& block) {
+template <int Dim>
+void SystemMatrixOf<Dim>::add_off_diagonal(int edge, const BlockOf<Dim>& block) {
   double* const values = matrix_.valuePtr();
-  for (int c = 0; c < 3; ++c) {
-    for (int r = 0; r < 3; ++r) values[edge_slot_(c, edge) + r] += block(r, c);
+  for (int c = 0; c < Dim; ++c) {
+    for (int r = 0; r < Dim; ++r) values[edge_slot_(c, edge) + r] += block(r, c);
   }
 }
 
-int SystemMatrix::edge_between(int low, int high) const {
+template <int Dim>
+int SystemMatrixOf<Dim>::edge_between(int low, int high) const {
   const auto begin = edge_high_.begin() + edge_begin_[static_cast<std::size_t>(low)];
   const auto end = edge_high_.begin() + edge_begin_[static_cast<std::size_t>(low) + 1];
-  return static_cast<int>(std::lower_bound(begin, end, high) - edge_high_.begin());
+  const auto at = std::lower_bound(begin, end, high);
+  return at == end || *at != high ? -1 : static_cast<int>(at - edge_high_.begin());
 }
 
-void SystemMatrix::add_mass(const Body& body, double factor) {
+template <int Dim>
+void SystemMatrixOf<Dim>::add_mass(const BodyOf<Dim>& body, double factor) {
   double* const values = matrix_.valuePtr();
   for (int i = 0; i < body.node_count(); ++i) {
-    for (int c = 0; c < 3; ++c) values[diagonal_slot_(c, i)] += factor * body.mass[i];
+    for (int c = 0; c < Dim; ++c) values[diagonal_slot_(c, i)] += factor * body.mass[i];
   }
 }
 
-void SystemMatrix::add_stiffness(const Body& body, const ConstPoints& x, const Eigen::VectorXd& activation, double factor) {
+template <int Dim>
+void SystemMatrixOf<Dim>::add_stiffness(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x,
+                                        const Eigen::VectorXd& activation, double factor) {
   for (int e = 0; e < body.edge_count(); ++e) {
     const int i = body.edges(0, e), j = body.edges(1, e);
-    const Eigen::Vector3d span = x.col(j) - x.col(i);
+    const VectorOf<Dim> span = x.col(j) - x.col(i);
     const double length = span.norm();
     if (length == 0) continue;
-    const Eigen::Vector3d n = span / length;
+    const VectorOf<Dim> n = span / length;
     const double across = std::max(0.0, 1 - activation[e] * body.rest_length[e] / length);
     const double k = factor * body.edge_stiffness[e];
-    Eigen::Matrix3d block = (k * (1 - across)) * n * n.transpose();
+    BlockOf<Dim> block = (k * (1 - across)) * n * n.transpose();
     block.diagonal().array() += k * across;
     add_diagonal(i, block);
     add_diagonal(j, block);
@@ -157,90 +169,104 @@ void SystemMatrix::add_stiffness(const Body& body, const ConstPoints& x, const E
   }
   for (int t = 0; t < body.tet_count(); ++t) {
     double jacobian;
-    const Eigen::Matrix<double, 3, 4> g = jacobian_gradient(x, body.tets, t, body.rest_volume[t], jacobian);
+    const Eigen::Matrix<double, Dim, Dim + 1> g = jacobian_gradient<Dim>(x, body.tets, t, body.rest_volume[t], jacobian);
     const double k = factor * body.volume_stiffness[t];
-    for (int a = 0; a < 4; ++a) add_diagonal(body.tets(a, t), k * g.col(a) * g.col(a).transpose());
+    for (int a = 0; a <= Dim; ++a) add_diagonal(body.tets(a, t), k * g.col(a) * g.col(a).transpose());
     int edge = 0;
-    for (int a = 0; a < 4; ++a) {
-      for (int b = a + 1; b < 4; ++b, ++edge) {
+    for (int a = 0; a <= Dim; ++a) {
+      for (int b = a + 1; b <= Dim; ++b, ++edge) {
         const bool in_order = body.tets(a, t) < body.tets(b, t);  // the block stands at (higher, lower)
-        const Eigen::Vector3d high = g.col(in_order ? b : a), low = g.col(in_order ? a : b);
+        const VectorOf<Dim> high = g.col(in_order ? b : a), low = g.col(in_order ? a : b);
         add_off_diagonal(body.tet_edges(edge, t), k * high * low.transpose());
       }
     }
   }
 }
 
-void SystemMatrix::add_damping(const Body& body, const ConstPoints& x, double factor) {
+template <int Dim>
+void SystemMatrixOf<Dim>::add_damping(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, double factor) {
   for (int e = 0; e < body.edge_count(); ++e) {
     const int i = body.edges(0, e), j = body.edges(1, e);
-    const Eigen::Vector3d span = x.col(j) - x.col(i);
+    const VectorOf<Dim> span = x.col(j) - x.col(i);
     const double length_squared = span.squaredNorm();
     if (length_squared == 0) continue;
-    const Eigen::Matrix3d block = (factor * body.edge_damping[e] / length_squared) * span * span.transpose();
+    const BlockOf<Dim> block = (factor * body.edge_damping[e] / length_squared) * span * span.transpose();
     add_diagonal(i, block);
     add_diagonal(j, block);
     add_off_diagonal(e, -block);
   }
 }
 
-void SystemMatrix::add_contact(const ContactPoints& points, int p, const Eigen::Matrix3d& block) {
-  for (int a = 0; a < 4; ++a) {
-    const int i = points.nodes(a, p);
-    const double wa = points.weights(a, p);
-    if (wa == 0) continue;
-    add_diagonal(i, (wa * wa) * block);
-    for (int b = a + 1; b < 4; ++b) {
-      const double weight = wa * points.weights(b, p);
+template <int Dim>
+void SystemMatrixOf<Dim>::add_contact(const ContactPointsOf<Dim>& points, int p, const BlockOf<Dim>& block) {
+  add_contact(Dim + 1, points.nodes.col(p).data(), points.weights.col(p).data(), block);
+}
+
+template <int Dim>
+void SystemMatrixOf<Dim>::add_contact(int count, const int* nodes, const double* weights, const BlockOf<Dim>& block) {
+  for (int a = 0; a < count; ++a) {
+    if (weights[a] == 0) continue;
+    add_diagonal(nodes[a], (weights[a] * weights[a]) * block);
+    for (int b = a + 1; b < count; ++b) {
+      const double weight = weights[a] * weights[b];
       if (weight == 0) continue;
-      const auto [low, high] = std::minmax(i, points.nodes(b, p));
-      add_off_diagonal(edge_between(low, high), weight * block);
+      const auto [low, high] = std::minmax(nodes[a], nodes[b]);
+      const int edge = edge_between(low, high);
+      if (edge >= 0) {
+        add_off_diagonal(edge, weight * block);
+      } else {
+        add_diagonal(low, weight * block);
+        add_diagonal(high, weight * block);
+      }
     }
   }
 }
 
-bool SystemMatrix::factor() {
+template <int Dim>
+bool SystemMatrixOf<Dim>::factor() {
   const double* const values = matrix_.valuePtr();
   for (std::size_t k = 0; k < order_.size(); ++k) {
     for (int s = source_begin_[k]; s < source_begin_[k + 1]; ++s) {
       const Source& source = source_[static_cast<std::size_t>(s)];
-      Eigen::Matrix3d& block = work_[static_cast<std::size_t>(source.column)];
-      for (int c = 0; c < 3; ++c) block.col(c) = Eigen::Vector3d::Map(values + edge_slot_(c, source.edge));
+      BlockOf<Dim>& block = work_[static_cast<std::size_t>(source.column)];
+      for (int c = 0; c < Dim; ++c) block.col(c) = VectorOf<Dim>::Map(values + edge_slot_(c, source.edge));
       if (source.transposed) block.transposeInPlace();
     }
-    Eigen::Matrix3d diagonal;
-    for (int c = 0; c < 3; ++c) {
-      for (int r = c; r < 3; ++r) diagonal(r, c) = diagonal(c, r) = values[diagonal_slot_(c, order_[k]) + r - c];
+    BlockOf<Dim> diagonal;
+    for (int c = 0; c < Dim; ++c) {
+      for (int r = c; r < Dim; ++r) diagonal(r, c) = diagonal(c, r) = values[diagonal_slot_(c, order_[k]) + r - c];
     }
     for (int n = entry_begin_[k]; n < entry_begin_[k + 1]; ++n) {
       const auto [column, slot] = entry_[static_cast<std::size_t>(n)];
-      Eigen::Matrix3d& block = work_[static_cast<std::size_t>(column)];
-      const Eigen::Matrix3d upper = block;
+      BlockOf<Dim>& block = work_[static_cast<std::size_t>(column)];
+      const BlockOf<Dim> upper = block;
       block.setZero();
       for (int p = column_begin_[static_cast<std::size_t>(column)]; p < slot; ++p) {
         work_[static_cast<std::size_t>(row_[static_cast<std::size_t>(p)])].noalias() -=
             l_[static_cast<std::size_t>(p)] * upper;
       }
-      Eigen::Matrix3d& l = l_[static_cast<std::size_t>(slot)];
+      BlockOf<Dim>& l = l_[static_cast<std::size_t>(slot)];
       l.noalias() = upper.transpose() * d_inverse_[static_cast<std::size_t>(column)];
       diagonal.noalias() -= l * upper;
     }
-    const Eigen::LLT<Eigen::Matrix3d> cholesky(diagonal);
+    const Eigen::LLT<BlockOf<Dim>> cholesky(diagonal);
     if (cholesky.info() != Eigen::Success) {
-      std::fill(work_.begin(), work_.end(), Eigen::Matrix3d::Zero());
+      std::fill(work_.begin(), work_.end(), BlockOf<Dim>::Zero());
       return false;
     }
-    d_inverse_[k] = cholesky.solve(Eigen::Matrix3d::Identity());
+    d_inverse_[k] = cholesky.solve(BlockOf<Dim>::Identity());
   }
   return true;
 }
 
-void SystemMatrix::solve_in_place(Eigen::Ref<Eigen::MatrixXd> columns) const {
+template <int Dim>
+void SystemMatrixOf<Dim>::solve_in_place(Eigen::Ref<Eigen::MatrixXd> columns) const {
   // Forward and back substitution with all right-hand sides of a row beside each other: one pass over L serves them all.
   const auto nodes = static_cast<Eigen::Index>(order_.size());
   scratch_.resize(columns.rows(), columns.cols());
-  const auto rows_of = [this](Eigen::Index k) { return scratch_.middleRows<3>(3 * k); };
-  for (Eigen::Index k = 0; k < nodes; ++k) rows_of(k) = columns.middleRows<3>(3 * order_[static_cast<std::size_t>(k)]);
+  const auto rows_of = [this](Eigen::Index k) { return scratch_.template middleRows<Dim>(Dim * k); };
+  for (Eigen::Index k = 0; k < nodes; ++k)
+    rows_of(k) = columns.template middleRows<Dim>(Dim * order_[static_cast<std::size_t>(k)]);
   for (Eigen::Index k = 0; k < nodes; ++k) {
     for (int p = column_begin_[static_cast<std::size_t>(k)]; p < column_begin_[static_cast<std::size_t>(k) + 1]; ++p) {
       rows_of(row_[static_cast<std::size_t>(p)]) -= l_[static_cast<std::size_t>(p)].lazyProduct(rows_of(k));
@@ -248,14 +274,18 @@ void SystemMatrix::solve_in_place(Eigen::Ref<Eigen::MatrixXd> columns) const {
   }
   for (Eigen::Index k = nodes - 1; k >= 0; --k) {
     for (Eigen::Index c = 0; c < scratch_.cols(); ++c) {
-      const Eigen::Vector3d column = d_inverse_[static_cast<std::size_t>(k)] * rows_of(k).col(c);
+      const VectorOf<Dim> column = d_inverse_[static_cast<std::size_t>(k)] * rows_of(k).col(c);
       rows_of(k).col(c) = column;
     }
     for (int p = column_begin_[static_cast<std::size_t>(k)]; p < column_begin_[static_cast<std::size_t>(k) + 1]; ++p) {
       rows_of(k) -= l_[static_cast<std::size_t>(p)].transpose().lazyProduct(rows_of(row_[static_cast<std::size_t>(p)]));
     }
   }
-  for (Eigen::Index k = 0; k < nodes; ++k) columns.middleRows<3>(3 * order_[static_cast<std::size_t>(k)]) = rows_of(k);
+  for (Eigen::Index k = 0; k < nodes; ++k)
+    columns.template middleRows<Dim>(Dim * order_[static_cast<std::size_t>(k)]) = rows_of(k);
 }
+
+template class SystemMatrixOf<2>;
+template class SystemMatrixOf<3>;
 
 }  // namespace hydrostat::physics

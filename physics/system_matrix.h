@@ -7,21 +7,26 @@
 
 namespace hydrostat::physics {
 
-/// A symmetric 3N x 3N matrix with one 3 x 3 block per node and per edge of a body, kept in place between assemblies;
-/// only the lower triangle is stored. Every term of an implicit step fits it: edges, tets, contact points inside tets.
-class SystemMatrix {
+/// A symmetric Dim N x Dim N matrix with one Dim x Dim block per node and per edge of a body, kept in place between
+/// assemblies; only the lower triangle is stored. Every term of an implicit step fits it: edges, tets, contact points inside
+/// tets.
+template <int Dim>
+class SystemMatrixOf {
  public:
-  explicit SystemMatrix(const Body& body);
+  explicit SystemMatrixOf(const BodyOf<Dim>& body);
 
   void set_zero();
-  void add_mass(const Body& body, double factor);
+  void add_mass(const BodyOf<Dim>& body, double factor);
   /// Adds factor * K(x, activation), the positive semi-definite part of the elastic Hessian: an edge under compression
   /// loses its buckling term, a tet keeps kappa V grad J grad J^T.
-  void add_stiffness(const Body& body, const ConstPoints& x, const Eigen::VectorXd& activation, double factor);
+  void add_stiffness(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const Eigen::VectorXd& activation, double factor);
   /// Adds factor * D(x), the dashpots' matrix.
-  void add_damping(const Body& body, const ConstPoints& x, double factor);
+  void add_damping(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, double factor);
   /// Adds w_i w_j * block for the nodes i, j of contact point p; block is symmetric.
-  void add_contact(const ContactPoints& points, int p, const Eigen::Matrix3d& block);
+  void add_contact(const ContactPointsOf<Dim>& points, int p, const BlockOf<Dim>& block);
+  /// The same for `count` nodes and weights >= 0. What couples two nodes without an edge has no place in the matrix and goes
+  /// to their diagonals, which makes the matrix larger, never less positive.
+  void add_contact(int count, const int* nodes, const double* weights, const BlockOf<Dim>& block);
 
   /// Factors the matrix into block L D L^T, up-looking, on the pattern that the constructor found; nothing is allocated.
   /// False: not positive definite.
@@ -33,16 +38,16 @@ class SystemMatrix {
   Eigen::Index size() const { return matrix_.rows(); }
 
  private:
-  void find_factor_pattern(const Body& body);
-  void add_off_diagonal(int edge, const Eigen::Matrix3d& block);
-  void add_diagonal(int node, const Eigen::Matrix3d& block);
-  int edge_between(int low, int high) const;
+  void find_factor_pattern(const BodyOf<Dim>& body);
+  void add_off_diagonal(int edge, const BlockOf<Dim>& block);
+  void add_diagonal(int node, const BlockOf<Dim>& block);
+  int edge_between(int low, int high) const;  // -1 for none
 
   Eigen::SparseMatrix<double> matrix_;
-  Eigen::Matrix3Xi diagonal_slot_;  // 3 x N: where rows c.. of column 3 i + c begin
-  Eigen::Matrix3Xi edge_slot_;      // 3 x E: where the block's column c begins
-  std::vector<int> edge_begin_;     // N + 1: the edges whose lower node is i (edges are in lexicographic order)
-  std::vector<int> edge_high_;      // E
+  Eigen::Matrix<int, Dim, Eigen::Dynamic> diagonal_slot_;  // Dim x N: where rows c.. of column Dim i + c begin
+  Eigen::Matrix<int, Dim, Eigen::Dynamic> edge_slot_;      // Dim x E: where the block's column c begins
+  std::vector<int> edge_begin_;  // N + 1: the edges whose lower node is i (edges are in lexicographic order)
+  std::vector<int> edge_high_;   // E
 
   // The factor: node order_[k] stands at place k, of column k the rows row_[column_begin_[k]] ... below the diagonal are
   // filled.
@@ -56,8 +61,9 @@ class SystemMatrix {
   std::vector<int> order_, column_begin_, row_, entry_begin_, source_begin_;
   std::vector<Entry> entry_;    // by rows, columns ascending
   std::vector<Source> source_;  // by rows
-  std::vector<Eigen::Matrix3d> l_, d_inverse_, work_;
+  std::vector<BlockOf<Dim>> l_, d_inverse_, work_;
   mutable Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> scratch_;
 };
+using SystemMatrix = SystemMatrixOf<3>;
 
 }  // namespace hydrostat::physics

@@ -9,17 +9,25 @@ namespace {
 
 constexpr double kDt = 1.0 / 240;
 
-TEST(Euler, LosesAngularMomentumInFreeFlightAndHidesNoneOfIt) {
-  const Body shape = bar(6, 2, 2, 0.1);
-  Scene scene = scene_of(shape, {});
-  scene.has_ground = false;
-  scene.gravity.setZero();
-  const Body& body = scene.body;
-  const std::unique_ptr<Stepper> stepper = make_euler_stepper(scene);
-  Impulses impulses = make_impulses(scene);
-  const Eigen::Vector3d centre = centre_of_mass(body, body.rest);
-  State state{body.rest, Eigen::Matrix3Xd(3, body.node_count())};
-  for (int i = 0; i < body.node_count(); ++i) state.v.col(i) = Eigen::Vector3d(1, 4, 2).cross(body.rest.col(i) - centre);
+template <typename Dimension>
+class Euler : public testing::Test {};
+TYPED_TEST_SUITE(Euler, BothDimensions, DimensionName);
+
+TYPED_TEST(Euler, LosesAngularMomentumInFreeFlightAndHidesNoneOfIt) {
+  constexpr int Dim = TypeParam::kDim;
+  const BodyOf<Dim> shape = bar<Dim>(6, 2, 2, 0.1);
+  const SceneOf<Dim> scene = in_the_air(shape, false);
+  const BodyOf<Dim>& body = scene.body;
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_euler_stepper(scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  const VectorOf<Dim> centre = centre_of_mass(body, body.rest);
+  SpinOf<Dim> rate;
+  if constexpr (Dim == 3) {
+    rate << 1, 4, 2;
+  } else {
+    rate << 4.6;
+  }
+  StateOf<Dim> state{body.rest, rigid_velocity<Dim>(body, body.rest, VectorOf<Dim>::Zero(), rate)};
   const double at_first = angular_momentum(body, state.x, state.v, centre).norm();
   for (int k = 0; k < 240; ++k) {
     ASSERT_EQ(stepper->step(kDt, Eigen::VectorXd::Ones(body.edge_count()), nullptr, state, impulses), Termination::kDone);
@@ -30,36 +38,37 @@ TEST(Euler, LosesAngularMomentumInFreeFlightAndHidesNoneOfIt) {
   EXPECT_LT(lost, 0.4);  // a quarter in a second at 4.6 rad/s
 }
 
-TEST(Euler, MovesWithTheVelocitiesThatItBooks) {
-  const Body shape = bar(5, 3, 2, 0.1);
-  const Scene scene = scene_of(shape, soles(shape), slope(10, 0.5));
-  const std::unique_ptr<Stepper> stepper = make_euler_stepper(scene);
-  Impulses impulses = make_impulses(scene);
-  State state = laid_down(scene, 0.01);
+TYPED_TEST(Euler, MovesWithTheVelocitiesThatItBooks) {
+  constexpr int Dim = TypeParam::kDim;
+  const BodyOf<Dim> shape = bar<Dim>(5, 3, 2, 0.1);
+  const SceneOf<Dim> scene = scene_of(shape, soles(shape), slope<Dim>(10, 0.5));
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_euler_stepper(scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  StateOf<Dim> state = laid_down(scene, 0.01);
   std::mt19937 random(1);
-  const double size = std::cbrt(shape.rest_volume.sum());
+  const double size = size_of(shape);
   for (int k = 0; k < 240; ++k) {
-    const State before = state;
+    const StateOf<Dim> before = state;
     const Eigen::VectorXd activation = random_activation(random, shape, 0.05);
     ASSERT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone) << "step " << k;
     EXPECT_LT(((state.x - before.x) / kDt - state.v).colwise().norm().maxCoeff(), 1.01e-4 * size);  // [m/s]
   }
 }
 
-TEST(Euler, ConvergesToTheExplicitMotionAsTheStepShrinks) {
-  Scene scene = scene_of(bar(3, 2, 2, 0.1), {});
-  scene.has_ground = false;
-  const Body& body = scene.body;
+TYPED_TEST(Euler, ConvergesToTheExplicitMotionAsTheStepShrinks) {
+  constexpr int Dim = TypeParam::kDim;
+  const SceneOf<Dim> scene = in_the_air(bar<Dim>(3, 2, 2, 0.1), true);
+  const BodyOf<Dim>& body = scene.body;
   std::mt19937 random(1);
   const Eigen::VectorXd activation = random_activation(random, body, 0.1);
-  Impulses impulses = make_impulses(scene);
-  const auto after_a_tenth_second = [&](Stepper& stepper, double dt) {
-    State state{body.rest, Eigen::Matrix3Xd::Zero(3, body.node_count())};
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  const auto after_a_tenth_second = [&](StepperOf<Dim>& stepper, double dt) {
+    StateOf<Dim> state{body.rest, PointsOf<Dim>::Zero(Dim, body.node_count())};
     for (int k = 0; k < static_cast<int>(std::round(0.1 / dt)); ++k) stepper.step(dt, activation, nullptr, state, impulses);
     return state.x;
   };
-  const Eigen::Matrix3Xd reference = after_a_tenth_second(*make_explicit_stepper(scene), 1.0 / 200000);
-  const std::unique_ptr<Stepper> stepper = make_euler_stepper(scene);
+  const PointsOf<Dim> reference = after_a_tenth_second(*make_explicit_stepper(scene), 1.0 / 200000);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_euler_stepper(scene);
   double last = (after_a_tenth_second(*stepper, 1.0 / 480) - reference).norm();
   for (const double rate : {960.0, 1920.0, 3840.0}) {
     const double error = (after_a_tenth_second(*stepper, 1 / rate) - reference).norm();
@@ -68,20 +77,21 @@ TEST(Euler, ConvergesToTheExplicitMotionAsTheStepShrinks) {
   }
 }
 
-TEST(Euler, SinksIntoTheGroundByNoMoreThanItsShareOfTheSize) {
+TYPED_TEST(Euler, SinksIntoTheGroundByNoMoreThanItsShareOfTheSize) {
+  constexpr int Dim = TypeParam::kDim;
   for (const double cell : {0.005, 0.1, 2.0}) {
     SCOPED_TRACE("cell " + std::to_string(cell) + " m");
     Material material;
     material.youngs_modulus = 2e7 * cell;  // as soft under its own weight at any scale
-    const Body shape = bar(4, 2, 2, cell, material);
-    const Scene scene = scene_of(shape, soles(shape));
-    const std::unique_ptr<Stepper> stepper = make_euler_stepper(scene);
-    Impulses impulses = make_impulses(scene);
-    State state = laid_down(scene);
+    const BodyOf<Dim> shape = bar<Dim>(4, 2, 2, cell, material);
+    const SceneOf<Dim> scene = scene_of(shape, soles(shape));
+    const std::unique_ptr<StepperOf<Dim>> stepper = make_euler_stepper(scene);
+    ImpulsesOf<Dim> impulses = make_impulses(scene);
+    StateOf<Dim> state = laid_down(scene);
     for (int k = 0; k < 480; ++k) {
       ASSERT_EQ(stepper->step(kDt, Eigen::VectorXd::Ones(shape.edge_count()), nullptr, state, impulses), Termination::kDone);
     }
-    EXPECT_LT(-state.x.row(1).minCoeff(), 0.0005 * std::cbrt(shape.rest_volume.sum()));
+    EXPECT_LT(-state.x.row(1).minCoeff(), 0.0005 * size_of(shape));
     EXPECT_GT(-state.x.row(1).minCoeff(), 0);
   }
 }

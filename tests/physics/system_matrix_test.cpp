@@ -10,24 +10,26 @@
 namespace hydrostat::physics {
 namespace {
 
-Eigen::MatrixXd dense(const SystemMatrix& matrix) {
+template <int Dim>
+Eigen::MatrixXd dense(const SystemMatrixOf<Dim>& matrix) {
   return Eigen::MatrixXd(Eigen::MatrixXd(matrix.lower()).selfadjointView<Eigen::Lower>());
 }
 
-SystemMatrix zero_matrix(const Body& body) {
-  SystemMatrix matrix(body);
+template <int Dim>
+SystemMatrixOf<Dim> zero_matrix(const BodyOf<Dim>& body) {
+  SystemMatrixOf<Dim> matrix(body);
   matrix.set_zero();
   return matrix;
 }
 
 /// -d force / d x by central differences.
-template <typename Force>
-Eigen::MatrixXd negative_slope(const Force& force, Eigen::Matrix3Xd x, double step) {
+template <int Dim, typename Force>
+Eigen::MatrixXd negative_slope(const Force& force, PointsOf<Dim> x, double step) {
   Eigen::MatrixXd slope(x.size(), x.size());
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const double here = x.reshaped()[k];
     x.reshaped()[k] = here + step;
-    const Eigen::Matrix3Xd ahead = force(x);
+    const PointsOf<Dim> ahead = force(x);
     x.reshaped()[k] = here - step;
     slope.col(k) = (force(x) - ahead).reshaped() / (2 * step);
     x.reshaped()[k] = here;
@@ -35,48 +37,55 @@ Eigen::MatrixXd negative_slope(const Force& force, Eigen::Matrix3Xd x, double st
   return slope;
 }
 
-TEST(SystemMatrix, StiffnessIsTheHessianAtRest) {
+template <typename Dimension>
+class SystemMatrices : public testing::Test {};
+TYPED_TEST_SUITE(SystemMatrices, BothDimensions, DimensionName);
+
+TYPED_TEST(SystemMatrices, StiffnessIsTheHessianAtRest) {
+  constexpr int Dim = TypeParam::kDim;
   for (unsigned seed = 0; seed < 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Body body = random_body(seed);
-    const Eigen::VectorXd passive = Eigen::VectorXd::Ones(body.edge_count());
-    SystemMatrix matrix = zero_matrix(body);
-    matrix.add_stiffness(body, body.rest, passive, 1);
-    const auto force = [&](const Eigen::Matrix3Xd& x) {
-      Eigen::Matrix3Xd sum = Eigen::Matrix3Xd::Zero(3, x.cols());
-      add_elastic_forces(body, x, passive, sum);
+    const BodyOf<Dim> body = random_body<Dim>(seed);
+    const Eigen::VectorXd ones = passive(body);
+    SystemMatrixOf<Dim> matrix = zero_matrix(body);
+    matrix.add_stiffness(body, body.rest, ones, 1);
+    const auto force = [&](const PointsOf<Dim>& x) {
+      PointsOf<Dim> sum = PointsOf<Dim>::Zero(Dim, x.cols());
+      add_elastic_forces(body, x, ones, sum);
       return sum;
     };
-    const Eigen::MatrixXd expected = negative_slope(force, body.rest, 1e-6);
+    const Eigen::MatrixXd expected = negative_slope<Dim>(force, body.rest, 1e-6);
     EXPECT_LT((dense(matrix) - expected).norm(), 1e-7 * expected.norm());
   }
 }
 
-TEST(SystemMatrix, DampingIsTheSlopeOfTheDashpots) {
+TYPED_TEST(SystemMatrices, DampingIsTheSlopeOfTheDashpots) {
+  constexpr int Dim = TypeParam::kDim;
   for (unsigned seed = 0; seed < 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
-    const Body body = random_body(seed);
-    const Eigen::Matrix3Xd x = body.rest + random_points(random, body.node_count(), 0.03);
-    SystemMatrix matrix = zero_matrix(body);
+    const BodyOf<Dim> body = random_body<Dim>(seed);
+    const PointsOf<Dim> x = body.rest + random_points<Dim>(random, body.node_count(), 0.03);
+    SystemMatrixOf<Dim> matrix = zero_matrix(body);
     matrix.add_damping(body, x, 1);
-    const auto force = [&](const Eigen::Matrix3Xd& v) {
-      Eigen::Matrix3Xd sum = Eigen::Matrix3Xd::Zero(3, v.cols());
+    const auto force = [&](const PointsOf<Dim>& v) {
+      PointsOf<Dim> sum = PointsOf<Dim>::Zero(3, v.cols());
       add_damping_forces(body, x, v, sum);
       return sum;
     };
-    const Eigen::MatrixXd expected = negative_slope(force, random_points(random, body.node_count(), 1), 1e-3);
+    const Eigen::MatrixXd expected = negative_slope<Dim>(force, random_points<Dim>(random, body.node_count(), 1), 1e-3);
     EXPECT_LT((dense(matrix) - expected).norm(), 1e-9 * expected.norm());
   }
 }
 
-TEST(SystemMatrix, IsPositiveSemiDefiniteInAnyState) {
+TYPED_TEST(SystemMatrices, IsPositiveSemiDefiniteInAnyState) {
+  constexpr int Dim = TypeParam::kDim;
   for (unsigned seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
-    const Body body = random_body(seed);
-    const Eigen::Matrix3Xd x = body.rest + random_points(random, body.node_count(), 0.1);  // inverted tets among them
-    SystemMatrix matrix = zero_matrix(body);
+    const BodyOf<Dim> body = random_body<Dim>(seed);
+    const PointsOf<Dim> x = body.rest + random_points<Dim>(random, body.node_count(), 0.1);  // inverted tets among them
+    SystemMatrixOf<Dim> matrix = zero_matrix(body);
     matrix.add_stiffness(body, x, random_activation(random, body, 0.4), 1);
     const Eigen::VectorXd eigenvalues =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(dense(matrix), Eigen::EigenvaluesOnly).eigenvalues();
@@ -84,50 +93,53 @@ TEST(SystemMatrix, IsPositiveSemiDefiniteInAnyState) {
   }
 }
 
-TEST(SystemMatrix, ContactIsASpringAtTheEmbeddedPoint) {
+TYPED_TEST(SystemMatrices, ContactIsASpringAtTheEmbeddedPoint) {
+  constexpr int Dim = TypeParam::kDim;
   for (unsigned seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
-    const Body body = random_body(seed);
-    ContactPoints points;
+    const BodyOf<Dim> body = random_body<Dim>(seed);
+    ContactPointsOf<Dim> points;
     points.nodes = body.tets.col(static_cast<Eigen::Index>(seed) % body.tet_count());
-    points.weights = Eigen::Vector4d(0.1, 0.2, 0.3, 0.4);
-    const Eigen::Matrix3d half = random_points(random, 3, 1), block = half * half.transpose();
-    SystemMatrix matrix = zero_matrix(body);
+    points.weights = Eigen::Vector4d(0.1, 0.2, 0.3, 0.4).tail<Dim + 1>() / (Dim == 3 ? 1 : 0.9);
+    const BlockOf<Dim> half = random_points<Dim>(random, Dim, 1), block = half * half.transpose();
+    SystemMatrixOf<Dim> matrix = zero_matrix(body);
     matrix.add_contact(points, 0, block);
-    Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(3, 3 * body.node_count());
-    for (int k = 0; k < 4; ++k)
-      weights.middleCols<3>(3 * points.nodes(k, 0)) = points.weights(k, 0) * Eigen::Matrix3d::Identity();
+    Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(Dim, Dim * body.node_count());
+    for (int k = 0; k <= Dim; ++k)
+      weights.template middleCols<Dim>(Dim * points.nodes(k, 0)) = points.weights(k, 0) * BlockOf<Dim>::Identity();
     const Eigen::MatrixXd expected = weights.transpose() * block * weights;
     EXPECT_LT((dense(matrix) - expected).norm(), 1e-14);
   }
 }
 
-TEST(SystemMatrix, SolvesForSeveralColumnsAtOnce) {
+TYPED_TEST(SystemMatrices, SolvesForSeveralColumnsAtOnce) {
+  constexpr int Dim = TypeParam::kDim;
   for (unsigned seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
-    const Body body = seed == 0 ? four_legged() : random_body(seed);
+    const BodyOf<Dim> body = seed == 0 ? four_legged<Dim>() : random_body<Dim>(seed);
     const double dt = 1.0 / 240;
-    SystemMatrix matrix = zero_matrix(body);
+    SystemMatrixOf<Dim> matrix = zero_matrix(body);
     matrix.add_mass(body, 1 / (dt * dt));
-    matrix.add_stiffness(body, body.rest + random_points(random, body.node_count(), 0.02),
+    matrix.add_stiffness(body, body.rest + random_points<Dim>(random, body.node_count(), 0.02),
                          random_activation(random, body, 0.3), 1);
     matrix.add_damping(body, body.rest, 1 / dt);
     ASSERT_TRUE(matrix.factor());
-    const Eigen::MatrixXd wanted = random_points(random, body.node_count() * 5, 1).reshaped(3 * body.node_count(), 5);
-    Eigen::MatrixXd columns = matrix.lower().selfadjointView<Eigen::Lower>() * wanted;
+    const Eigen::MatrixXd wanted = random_points<Dim>(random, body.node_count() * 5, 1).reshaped(Dim * body.node_count(), 5);
+    Eigen::MatrixXd columns = matrix.lower().template selfadjointView<Eigen::Lower>() * wanted;
     matrix.solve_in_place(columns);
     EXPECT_LT((columns - wanted).norm(), 1e-11 * wanted.norm());
-    Eigen::VectorXd one = matrix.lower().selfadjointView<Eigen::Lower>() * wanted.col(2);
+    Eigen::VectorXd one = matrix.lower().template selfadjointView<Eigen::Lower>() * wanted.col(2);
     matrix.solve_in_place(one);
     EXPECT_LT((one - wanted.col(2)).norm(), 1e-11 * wanted.norm());
   }
 }
 
-TEST(SystemMatrix, RefusesToFactorWhatIsNotPositiveDefiniteAndRecovers) {
-  const Body body = random_body(2);
-  SystemMatrix matrix = zero_matrix(body);
+TYPED_TEST(SystemMatrices, RefusesToFactorWhatIsNotPositiveDefiniteAndRecovers) {
+  constexpr int Dim = TypeParam::kDim;
+  const BodyOf<Dim> body = random_body<Dim>(2);
+  SystemMatrixOf<Dim> matrix = zero_matrix(body);
   matrix.add_mass(body, -1);
   EXPECT_FALSE(matrix.factor());
   matrix.set_zero();
@@ -135,7 +147,7 @@ TEST(SystemMatrix, RefusesToFactorWhatIsNotPositiveDefiniteAndRecovers) {
   ASSERT_TRUE(matrix.factor());
   Eigen::VectorXd column = Eigen::VectorXd::Ones(matrix.size());
   matrix.solve_in_place(column);
-  EXPECT_LT((column.reshaped(3, body.node_count()).row(0).transpose() - body.mass.cwiseInverse()).norm(), 1e-12);
+  EXPECT_LT((column.reshaped(Dim, body.node_count()).row(0).transpose() - body.mass.cwiseInverse()).norm(), 1e-12);
 }
 
 }  // namespace

@@ -1,0 +1,122 @@
+#include "physics/impulse_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hydrostat::physics {
+namespace {
+
+constexpr double kReach = 0.1;  // of the shortest edge [-]: places as near as that are watched
+constexpr int kSweeps = 30;
+constexpr double kTolerance = 1e-7;  // [m/s] change of a place's velocity in a sweep
+
+}  // namespace
+
+template <int Dim>
+ImpulseContact<Dim>::ImpulseContact(const SceneOf<Dim>& scene)
+    : set_(scene), inverse_mass_(scene.body.mass.cwiseInverse()), impulse_(PointsOf<Dim>::Zero(Dim, set_.slot_count())) {
+  shortest_edge_ = scene.body.rest_length.minCoeff();
+  push_out_speed_ = push_out_speed(scene);
+  active_.reserve(static_cast<std::size_t>(set_.slot_count()));
+  is_candidate_.resize(static_cast<std::size_t>(set_.slot_count()));
+}
+
+template <int Dim>
+void ImpulseContact<Dim>::find_candidates(double farther, const StateOf<Dim>& state) {
+  reach_ = kReach * shortest_edge_;
+  set_.find(state, reach_ + farther);
+  std::fill(is_candidate_.begin(), is_candidate_.end(), 0);
+  for (const ContactOf<Dim>& contact : set_.candidates()) is_candidate_[static_cast<std::size_t>(contact.slot)] = 1;
+  for (std::size_t s = 0; s < is_candidate_.size(); ++s) {
+    if (!is_candidate_[s]) impulse_.col(static_cast<Eigen::Index>(s)).setZero();
+  }
+}
+
+template <int Dim>
+void ImpulseContact<Dim>::apply(const ContactOf<Dim>& contact, const VectorOf<Dim>& impulse, StateOf<Dim>& state) const {
+  for (int k = 0; k < contact.node_count; ++k) {
+    const auto n = static_cast<std::size_t>(k);
+    state.v.col(contact.nodes[n]) += (contact.weights[n] * inverse_mass_[contact.nodes[n]]) * impulse;
+  }
+}
+
+template <int Dim>
+void ImpulseContact<Dim>::gather_active(double h, StateOf<Dim>& state) {
+  active_.clear();
+  std::vector<ContactOf<Dim>>& candidates = set_.candidates();
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    ContactOf<Dim>& contact = candidates[c];
+    set_.update(state.x, state.obstacle_travel, contact);
+    if (!std::isfinite(contact.gap)) {
+      impulse_.col(contact.slot).setZero();
+      continue;
+    }
+    const VectorOf<Dim> velocity = contact.of(state.v) - set_.velocity(contact);
+    if (contact.gap + h * contact.normal.dot(velocity) < 0 || impulse_.col(contact.slot).squaredNorm() > 0) {
+      active_.push_back({static_cast<int>(c), std::min(-contact.gap / h, push_out_speed_)});
+      apply(contact, impulse_.col(contact.slot), state);  // warm start
+    }
+  }
+}
+
+/// Returns the largest change of a place's velocity [m/s].
+template <int Dim>
+double ImpulseContact<Dim>::sweep(StateOf<Dim>& state) {
+  double change = 0;
+  for (const Active& active : active_) {
+    const ContactOf<Dim>& contact = set_.candidates()[static_cast<std::size_t>(active.candidate)];
+    const VectorOf<Dim> velocity = contact.of(state.v) - set_.velocity(contact);
+    const VectorOf<Dim>& normal = contact.normal;
+    VectorOf<Dim> wanted = impulse_.col(contact.slot);
+    const double normal_velocity = normal.dot(velocity);
+    const double normal_impulse =
+        std::max(0.0, normal.dot(wanted) + (active.least_velocity - normal_velocity) / contact.inverse_mass);
+    VectorOf<Dim> tangential =
+        wanted - normal.dot(wanted) * normal - (velocity - normal_velocity * normal) / contact.inverse_mass;
+    const double limit = set_.friction(contact) * normal_impulse, size = tangential.norm();
+    if (size > limit) tangential *= limit / size;
+    wanted = normal_impulse * normal + tangential;
+    const VectorOf<Dim> step = wanted - impulse_.col(contact.slot);
+    change = std::max(change, step.norm() * contact.inverse_mass);
+    impulse_.col(contact.slot) = wanted;
+    apply(contact, step, state);
+  }
+  return change;
+}
+
+template <int Dim>
+void ImpulseContact<Dim>::push_apart(double h, double fastest, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
+  // What contact itself may add to a node's speed is within twice the fastest.
+  const double farthest = 2 * h * fastest + h * (push_out_speed_ + set_.fastest_obstacle());
+  reach_ -= farthest;
+  if (reach_ < 0) find_candidates(farthest, state);
+  gather_active(h, state);
+  for (int k = 0; k < kSweeps; ++k) {
+    if (sweep(state) < kTolerance) break;
+  }
+  book(state, impulses);
+  set_.move_obstacles(h, state.obstacle_travel);
+}
+
+template <int Dim>
+void ImpulseContact<Dim>::book(const StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
+  for (const Active& active : active_) {
+    const ContactOf<Dim>& contact = set_.candidates()[static_cast<std::size_t>(active.candidate)];
+    const VectorOf<Dim> impulse = impulse_.col(contact.slot), place = contact.of(state.x);
+    for (int k = 0; k < contact.point_count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      impulses.contact.col(contact.points[n]) += contact.shares[n] * impulse;
+    }
+    for (int k = 0; k < contact.node_count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      impulses.contact_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
+    }
+    impulses.contact_moment += cross<Dim>(place, impulse);
+    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + std::max(0.0, active.least_velocity) * contact.normal);
+  }
+}
+
+template class ImpulseContact<2>;
+template class ImpulseContact<3>;
+
+}  // namespace hydrostat::physics

@@ -1,0 +1,183 @@
+#include "physics/penalty_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hydrostat::physics {
+namespace {
+
+constexpr double kSinkage = 0.0005;          // of the body's size [-]: how deep one place sinks that bears the whole weight
+constexpr double kWeightOfNoGravity = 9.81;  // [m/s2] takes gravity's place in the contact stiffness where there is none
+
+}  // namespace
+
+template <int Dim>
+PenaltyContact<Dim>::PenaltyContact(const SceneOf<Dim>& scene)
+    : set_(scene),
+      stretch_(PointsOf<Dim>::Zero(Dim, set_.slot_count())),
+      depth_at_rest_(Eigen::VectorXd::Zero(set_.slot_count())),
+      touching_(static_cast<std::size_t>(set_.slot_count()), 0) {
+  const double gravity = scene.gravity.norm(), size = size_of_volume<Dim>(scene.body.rest_volume.sum());
+  stiffness_ = scene.body.mass.sum() * (gravity > 0 ? gravity : kWeightOfNoGravity) / (kSinkage * size);
+  push_out_speed_ = push_out_speed(scene);
+  touches_.reserve(static_cast<std::size_t>(set_.slot_count()));
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::begin(const StateOf<Dim>& start, const PointsOf<Dim>& foreseen, double dt, double reach) {
+  dt_ = dt;
+  touches_.clear();
+  travel_ = start.obstacle_travel;
+  set_.move_obstacles(dt, travel_);
+  set_.find(start, reach);
+  for (ContactOf<Dim>& contact : set_.candidates()) {
+    set_.update(foreseen, travel_, contact);
+    if (!std::isfinite(contact.gap)) continue;
+    touches_.emplace_back();
+    Touch& touch = touches_.back();
+    touch.contact = contact;
+    touch.friction_normal = contact.normal;
+    touch.plane_offset = contact.normal.dot(contact.of(foreseen)) - contact.gap;
+    lay_anchor(start, dt, touch);
+  }
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::lay_anchor(const StateOf<Dim>& start, double dt, Touch& touch) const {
+  const int slot = touch.contact.slot;
+  const bool goes_on = touching_[static_cast<std::size_t>(slot)] != 0;
+  touch.anchor = touch.contact.of(start.x) + dt * set_.velocity(touch.contact);
+  if (goes_on) touch.anchor -= stretch_.col(slot);
+  VectorOf<Dim> normal;
+  double deep = depth_at_rest_[slot];
+  if (!goes_on) {
+    touch.depth_at_rest = 0;
+    // The surface as it was when the step began.
+    deep = std::max(0.0, depth(touch, start.x, normal) - dt * normal.dot(set_.velocity(touch.contact)));
+  }
+  touch.lift = std::min(deep, dt * push_out_speed_);
+  touch.depth_at_rest = deep - touch.lift;
+}
+
+/// Of the place below its spring's rest [m]; negative where it is free.
+template <int Dim>
+double PenaltyContact<Dim>::depth(const Touch& touch, const PointsOf<Dim>& x, VectorOf<Dim>& normal) const {
+  if (touch.contact.point_count == 1) return -set_.gap(x, travel_, touch.contact, normal) - touch.depth_at_rest;
+  normal = touch.contact.normal;
+  return touch.plane_offset - normal.dot(touch.contact.of(x)) - touch.depth_at_rest;
+}
+
+/// From a place's anchor to the place, along the surface [m].
+template <int Dim>
+VectorOf<Dim> PenaltyContact<Dim>::slip(const Touch& touch, const PointsOf<Dim>& x) const {
+  const VectorOf<Dim> whole = touch.contact.of(x) - touch.anchor;
+  return whole - touch.friction_normal.dot(whole) * touch.friction_normal;
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::update_friction(const PointsOf<Dim>& x) {
+  for (Touch& touch : touches_) {
+    touch.last_limit = touch.limit;
+    touch.limit = set_.friction(touch.contact) * stiffness_ * std::max(0.0, depth(touch, x, touch.friction_normal));
+  }
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::shorten_friction_update(double part) {
+  for (Touch& touch : touches_) touch.limit = part * touch.limit + (1 - part) * touch.last_limit;
+}
+
+template <int Dim>
+double PenaltyContact<Dim>::potential(const PointsOf<Dim>& x) const {
+  double sum = 0;
+  VectorOf<Dim> normal;
+  for (const Touch& touch : touches_) {
+    const double deep = std::max(0.0, depth(touch, x, normal));
+    sum += 0.5 * stiffness_ * deep * deep;
+    if (touch.limit == 0) continue;
+    const double distance = slip(touch, x).norm(), pull = stiffness_ * distance;
+    sum += pull <= touch.limit ? 0.5 * pull * distance : touch.limit * (distance - 0.5 * touch.limit / stiffness_);
+  }
+  return sum;
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::add_forces(const PointsOf<Dim>& x, PointsOf<Dim>& force) {
+  VectorOf<Dim> normal;
+  for (Touch& touch : touches_) {
+    touch.force.setZero();
+    const double deep = depth(touch, x, normal);
+    if (deep > 0) touch.force = stiffness_ * deep * normal;
+    if (touch.limit > 0) {
+      const VectorOf<Dim> from_anchor = slip(touch, x);
+      const double pull = stiffness_ * from_anchor.norm();
+      touch.force -= (stiffness_ * (pull > touch.limit ? touch.limit / pull : 1)) * from_anchor;
+    }
+    for (int k = 0; k < touch.contact.node_count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      force.col(touch.contact.nodes[n]) += touch.contact.weights[n] * touch.force;
+    }
+  }
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) const {
+  VectorOf<Dim> normal;
+  for (const Touch& touch : touches_) {
+    BlockOf<Dim> block = BlockOf<Dim>::Zero();
+    if (depth(touch, x, normal) > 0) block = stiffness_ * normal * normal.transpose();
+    if (touch.limit > 0) {
+      const VectorOf<Dim> from_anchor = slip(touch, x);
+      const double distance = from_anchor.norm();
+      BlockOf<Dim> tangential = BlockOf<Dim>::Identity() - touch.friction_normal * touch.friction_normal.transpose();
+      if (stiffness_ * distance > touch.limit) {
+        tangential -= from_anchor * from_anchor.transpose() / (distance * distance);
+        tangential *= touch.limit / distance;
+      } else {
+        tangential *= stiffness_;
+      }
+      block += tangential;
+    }
+    matrix.add_contact(touch.contact.node_count, touch.contact.nodes.data(), touch.contact.weights.data(), factor * block);
+  }
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim>& impulses) const {
+  for (const Touch& touch : touches_) {
+    const ContactOf<Dim>& contact = touch.contact;
+    const VectorOf<Dim> impulse = dt * touch.force, place = contact.of(x);
+    for (int k = 0; k < contact.point_count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      impulses.contact.col(contact.points[n]) += contact.shares[n] * impulse;
+    }
+    for (int k = 0; k < contact.node_count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      impulses.contact_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
+    }
+    impulses.contact_moment += cross<Dim>(place, impulse);
+    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + (touch.lift / dt) * contact.normal);
+  }
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::end(const PointsOf<Dim>& x, PointsOf<Dim>& obstacle_travel) {
+  std::fill(touching_.begin(), touching_.end(), 0);
+  VectorOf<Dim> normal;
+  for (const Touch& touch : touches_) {
+    const int slot = touch.contact.slot;
+    const bool touches = touch.limit > 0 || depth(touch, x, normal) > 0;
+    touching_[static_cast<std::size_t>(slot)] = touches ? 1 : 0;
+    if (!touches) continue;
+    const VectorOf<Dim> from_anchor = slip(touch, x);
+    const double pull = stiffness_ * from_anchor.norm();
+    stretch_.col(slot) = (pull > touch.limit ? touch.limit / pull : 1) * from_anchor;
+    depth_at_rest_[slot] = touch.depth_at_rest;
+  }
+  obstacle_travel = travel_;
+}
+
+template class PenaltyContact<2>;
+template class PenaltyContact<3>;
+
+}  // namespace hydrostat::physics

@@ -1,0 +1,90 @@
+#include "physics/scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+namespace hydrostat::physics {
+
+template <int Dim>
+ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene) {
+  ImpulsesOf<Dim> impulses;
+  impulses.contact.resize(Dim, scene.contact_points.count());
+  impulses.contact_nodes.resize(Dim, scene.body.node_count());
+  impulses.effect_nodes.resize(Dim, scene.body.node_count());
+  clear(impulses);
+  return impulses;
+}
+
+template <int Dim>
+void clear(ImpulsesOf<Dim>& impulses) {
+  impulses.contact.setZero();
+  impulses.contact_nodes.setZero();
+  impulses.contact_moment.setZero();
+  impulses.effect_nodes.setZero();
+  impulses.effect_moment.setZero();
+  impulses.gravity_moment.setZero();
+  impulses.obstacle_work = 0;
+}
+
+template <int Dim>
+double push_out_speed(const SceneOf<Dim>& scene) {
+  const double gravity = scene.gravity.norm();
+  return 0.25 * std::sqrt((gravity > 0 ? gravity : 9.81) * size_of_volume<Dim>(scene.body.rest_volume.sum()));
+}
+
+template <int Dim>
+void touch_with_whole_surface(SceneOf<Dim>& scene) {
+  const BodyOf<Dim>& body = scene.body;
+  // A face of one tet alone is on the surface; it turns away from the tet's fourth node.
+  std::map<std::array<int, Dim>, std::pair<int, int>> faces;  // by its nodes in order: tet and the node opposite, or -1
+  for (int t = 0; t < body.tet_count(); ++t) {
+    for (int opposite = 0; opposite <= Dim; ++opposite) {
+      std::array<int, Dim> key;
+      for (int k = 0, n = 0; k <= Dim; ++k) {
+        if (k != opposite) key[static_cast<std::size_t>(n++)] = body.tets(k, t);
+      }
+      std::sort(key.begin(), key.end());
+      const auto [entry, is_new] = faces.try_emplace(key, t, opposite);
+      if (!is_new) entry->second = {-1, -1};
+    }
+  }
+  std::vector<int> point_of(static_cast<std::size_t>(body.node_count()), -1);
+  ContactPointsOf<Dim>& points = scene.contact_points;
+  points.nodes.resize(Dim + 1, body.node_count());
+  points.weights.setZero(Dim + 1, body.node_count());
+  scene.contact_faces.resize(Dim, static_cast<Eigen::Index>(faces.size()));
+  int point_count = 0, face_count = 0;
+  for (const auto& [key, owner] : faces) {
+    const auto [t, opposite] = owner;
+    if (t < 0) continue;
+    // The other nodes of a tet run around the outside as they stand or, if an odd one is missing, the other way.
+    for (int k = 0, n = 0; k <= Dim; ++k) {
+      if (k == opposite) continue;
+      int& point = point_of[static_cast<std::size_t>(body.tets(k, t))];
+      if (point < 0) {
+        point = point_count++;
+        points.nodes.col(point) = body.tets.col(t);
+        points.weights(k, point) = 1;
+      }
+      scene.contact_faces(n++, face_count) = point;
+    }
+    if (opposite % 2 == 1) std::swap(scene.contact_faces(0, face_count), scene.contact_faces(1, face_count));
+    ++face_count;
+  }
+  points.nodes.conservativeResize(Dim + 1, point_count);
+  points.weights.conservativeResize(Dim + 1, point_count);
+  scene.contact_faces.conservativeResize(Dim, face_count);
+}
+
+#define HYDROSTAT_INSTANTIATE(Dim)                                  \
+  template ImpulsesOf<Dim> make_impulses<Dim>(const SceneOf<Dim>&); \
+  template void clear<Dim>(ImpulsesOf<Dim>&);                       \
+  template double push_out_speed<Dim>(const SceneOf<Dim>&);         \
+  template void touch_with_whole_surface<Dim>(SceneOf<Dim>&);
+HYDROSTAT_INSTANTIATE(2)
+HYDROSTAT_INSTANTIATE(3)
+#undef HYDROSTAT_INSTANTIATE
+
+}  // namespace hydrostat::physics

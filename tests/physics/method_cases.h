@@ -1,0 +1,81 @@
+#pragma once
+
+#include "tests/physics/lattice_scene.h"
+
+namespace hydrostat::physics {
+
+template <int D, Method M>
+struct Case {
+  static constexpr int kDim = D;
+  static constexpr Method kMethod = M;
+};
+struct CaseName {
+  template <typename Type>
+  static std::string GetName(int) {
+    return name_of(Type::kMethod) + std::to_string(Type::kDim) + "d";
+  }
+};
+/// Every method in both dimensions.
+using Cases =
+    testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>>;
+
+/// Steps a scene with one method and gives each step to `look(before, after, impulses)`.
+template <int Dim, typename Look>
+StateOf<Dim> simulate(Method method, const SceneOf<Dim>& scene, StateOf<Dim> state, double dt, int steps, const Look& look) {
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  const Eigen::VectorXd ones = passive(scene.body);
+  for (int k = 0; k < steps; ++k) {
+    const StateOf<Dim> before = state;
+    const Termination termination = stepper->step(dt, ones, nullptr, state, impulses);
+    EXPECT_TRUE(termination == Termination::kDone) << "diverged in step " << k;
+    if (termination != Termination::kDone) break;
+    look(before, state, impulses);
+  }
+  return state;
+}
+
+/// By how much the change of momentum differs from what was booked, over m g.
+template <int Dim>
+double momentum_residual(const SceneOf<Dim>& scene, const StateOf<Dim>& before, const StateOf<Dim>& after,
+                         const ImpulsesOf<Dim>& impulses, double dt) {
+  const BodyOf<Dim>& body = scene.body;
+  const double mass = body.mass.sum();
+  const VectorOf<Dim> booked =
+      impulses.contact.rowwise().sum() + impulses.effect_nodes.rowwise().sum() + dt * mass * scene.gravity;
+  return (momentum(body, after.v) - momentum(body, before.v) - booked).norm() / (dt * mass * 9.81);
+}
+
+/// The deepest place of the body's surface [m], looked for all over its faces, in any obstacle or the ground; 0 for none.
+template <int Dim>
+double deepest_place(const SceneOf<Dim>& scene, const StateOf<Dim>& state) {
+  constexpr int kParts = 8;
+  double deepest = 0;
+  VectorOf<Dim> normal;
+  for (Eigen::Index f = 0; f < scene.contact_faces.cols(); ++f) {
+    for (int i = 0; i <= kParts; ++i) {
+      for (int j = 0; j <= (Dim == 3 ? kParts - i : 0); ++j) {
+        const double weights[3] = {1 - static_cast<double>(i + j) / kParts, static_cast<double>(i) / kParts,
+                                   static_cast<double>(j) / kParts};
+        VectorOf<Dim> place = VectorOf<Dim>::Zero();
+        for (int k = 0; k < Dim; ++k) place += weights[k] * scene.contact_points.of(state.x, scene.contact_faces(k, f));
+        for (std::size_t n = 0; n < scene.obstacles.size(); ++n) {
+          VectorOf<Dim> travel = VectorOf<Dim>::Zero();
+          if (state.obstacle_travel.cols() > 0) travel = state.obstacle_travel.col(static_cast<Eigen::Index>(n));
+          deepest = std::max(deepest, -signed_distance<Dim>(scene.obstacles[n], travel, place, normal));
+        }
+        if (scene.has_ground) deepest = std::max(deepest, scene.ground.offset - scene.ground.normal.dot(place));
+      }
+    }
+  }
+  return deepest;
+}
+
+/// The turn by `degrees` that takes the x axis toward the y axis.
+template <int Dim>
+BlockOf<Dim> tilt(double degrees) {
+  const double angle = degrees * 3.14159265358979323846 / 180;
+  return turn_to<Dim>(vec<Dim>(-std::sin(angle), std::cos(angle), 0));
+}
+
+}  // namespace hydrostat::physics

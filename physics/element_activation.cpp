@@ -1,8 +1,8 @@
 #include "physics/element_activation.h"
 
-#include <Eigen/LU>
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
-#include <cassert>
+#include <cmath>
 
 #include "physics/element_hourglass.h"
 #include "physics/element_variation.h"
@@ -48,6 +48,36 @@ SquareMatrix<double, Dim> strain_matrix(const Column& column) {
   return strain;
 }
 
+/// exp(e), its inverse, and how the inverse changes with e.
+template <int Dim>
+class ActiveStretch {
+ public:
+  using Square = SquareMatrix<double, Dim>;
+  explicit ActiveStretch(const Square& strain) : modes_(strain) {}
+
+  Square stretch() const { return modes_.eigenvectors() * exponential(1).asDiagonal() * modes_.eigenvectors().transpose(); }
+  Square inverse() const { return modes_.eigenvectors() * exponential(-1).asDiagonal() * modes_.eigenvectors().transpose(); }
+
+  /// Change of the inverse when the strain changes by dstrain.
+  /// Source: Daleckii and Krein; Higham, "Functions of Matrices", SIAM 2008, theorem 3.11.
+  Square change_of_inverse(const Square& dstrain) const {
+    const Square& V = modes_.eigenvectors();
+    Square change = V.transpose() * dstrain * V;
+    for (int i = 0; i < Dim; ++i) {
+      for (int j = 0; j < Dim; ++j) {
+        const double half = 0.5 * (modes_.eigenvalues()[i] - modes_.eigenvalues()[j]);
+        const double mean = 0.5 * (modes_.eigenvalues()[i] + modes_.eigenvalues()[j]);
+        change(i, j) *= -std::exp(-mean) * (std::abs(half) < 1e-4 ? 1 + half * half / 6 : std::sinh(half) / half);
+      }
+    }
+    return V * change * V.transpose();
+  }
+
+ private:
+  Eigen::Matrix<double, Dim, 1> exponential(double sign) const { return (sign * modes_.eigenvalues()).array().exp(); }
+  Eigen::SelfAdjointEigenSolver<Square> modes_;
+};
+
 template <int Dim, int Nodes>
 void write_active(const SquareMatrix<double, Dim>& inverse, const double* hourglass, int element, std::vector<Lanes>& lanes) {
   using Layout = ActiveLayout<Dim, Nodes>;
@@ -58,22 +88,28 @@ void write_active(const SquareMatrix<double, Dim>& inverse, const double* hourgl
 }
 
 template <int Dim, int Nodes>
-bool set_activation_of(const ActivationFit<Dim>& fit, const Eigen::VectorXd& activation, ActiveStrain<Dim>& active) {
-  constexpr int kPairs = Nodes * (Nodes - 1) / 2;
-  constexpr int kShape = kStrains<Dim> + ElementLayout<Dim, Nodes>::kCoordinates;
-  Eigen::Matrix<double, kPairs, 1> change;
-  Eigen::Matrix<double, kShape, 1> shape;
+struct ActiveShape {
+  static constexpr int kPairs = Nodes * (Nodes - 1) / 2;
+  static constexpr int kSize = kStrains<Dim> + ElementLayout<Dim, Nodes>::kCoordinates;
+  using Coordinates = Eigen::Matrix<double, kSize, 1>;  // strain, then hourglass
+
+  static Coordinates of(const ActivationFit<Dim>& fit, const Eigen::VectorXd& activation, int element) {
+    Eigen::Matrix<double, kPairs, 1> logarithm;
+    for (int p = 0; p < kPairs; ++p) logarithm[p] = std::log(activation[fit.of_element(p, element)]);
+    Coordinates result;
+    result.noalias() = fit.maps[static_cast<std::size_t>(fit.map_of_element[element])] * logarithm;
+    return result;
+  }
+};
+
+template <int Dim, int Nodes>
+void set_activation_of(const ActivationFit<Dim>& fit, const Eigen::VectorXd& activation, ActiveStrain<Dim>& active) {
+  using Shape = ActiveShape<Dim, Nodes>;
   for (int e = 0; e < fit.of_element.cols(); ++e) {
-    for (int p = 0; p < kPairs; ++p) change[p] = activation[fit.of_element(p, e)] - 1;
-    shape.noalias() = fit.maps[static_cast<std::size_t>(fit.map_of_element[e])] * change;
-    const SquareMatrix<double, Dim> stretch = strain_matrix<Dim>(shape) + SquareMatrix<double, Dim>::Identity();
-    // Positive definite: all leading minors are.
-    if (!(stretch(0, 0) > 0) || !(stretch.template topLeftCorner<2, 2>().determinant() > 0) || !(stretch.determinant() > 0)) {
-      return false;
-    }
+    const typename Shape::Coordinates shape = Shape::of(fit, activation, e);
+    const ActiveStretch<Dim> stretch(strain_matrix<Dim>(shape));
     write_active<Dim, Nodes>(stretch.inverse(), shape.data() + kStrains<Dim>, e, active.lanes);
   }
-  return true;
 }
 
 template <int Dim, int Nodes>
@@ -88,34 +124,40 @@ ActiveStrain<Dim> make_active_strain_of(const ElementBlock<Dim>& block) {
 }
 
 template <int Dim, int Nodes>
-Eigen::MatrixXd force_per_activation(const ElementVariation<Dim, Nodes>& variation, const ElementBlock<Dim>& block,
-                                     const Eigen::MatrixXd& map, int element) {
+Eigen::MatrixXd force_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
+                                     const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation) {
   using Variation = ElementVariation<Dim, Nodes>;
-  const SquareMatrix<double, Dim>& inverse = variation.active_inverse();
-  const ElementData<double> data(block.lanes, element, ElementLayout<Dim, Nodes>::kSize);
-  const Lame lame{data[ElementLayout<Dim, Nodes>::kLambda], data[ElementLayout<Dim, Nodes>::kMu]};
-  const GradientDerivative<Dim> moduli = stress_derivative<Dim>(block.law, lame, variation.F(), Definiteness::kExact);
+  using Square = SquareMatrix<double, Dim>;
+  constexpr int kModes = Variation::kModes;
+  const auto shape = ActiveShape<Dim, Nodes>::of(fit, activation, element);
+  const ActiveStretch<Dim> active(strain_matrix<Dim>(shape));
+  typename Variation::Hourglass rest;
+  for (int k = 0; k < Dim * kModes; ++k) rest(k) = shape[kStrains<Dim> + k];
+  const Variation variation(block, element, x, active.inverse(), rest);
+  const GradientDerivative<Dim> moduli = variation.moduli(Definiteness::kExact);
   const typename Variation::Weights weights = variation.node_weights();
+  const Square stretch = active.stretch();
+  const Eigen::MatrixXd& map = fit.maps[static_cast<std::size_t>(fit.map_of_element[element])];
   Eigen::MatrixXd result(Dim * Nodes, map.cols());
   for (int pair = 0; pair < map.cols(); ++pair) {
-    const SquareMatrix<double, Dim> strain = strain_matrix<Dim>(map.col(pair));
+    const Square undo = stretch * active.change_of_inverse(strain_matrix<Dim>(map.col(pair)));
     typename Variation::Change change;
-    change.F = -variation.F() * strain * inverse;
+    change.F = variation.F() * undo;
     const Eigen::Matrix<double, Dim * Dim, 1> of_law = moduli * change.F.reshaped();
     typename Variation::Response response;
-    response.stress = of_law.reshaped(Dim, Dim);
-    if constexpr (Variation::kModes > 0) {
-      for (int k = 0; k < Dim * Variation::kModes; ++k) change.rest(k) = map(kStrains<Dim> + k, pair);
+    // The nodes feel the stress through A^-1, which changes too.
+    response.stress = of_law.reshaped(Dim, Dim) + variation.stress() * undo.transpose();
+    if constexpr (kModes > 0) {
+      for (int k = 0; k < Dim * kModes; ++k) change.rest(k) = map(kStrains<Dim> + k, pair);
       const typename Variation::Response of_hourglass = variation.respond(change);
       response.stress += of_hourglass.stress;
       response.force = of_hourglass.force;
     }
-    // Nodes feel the stress through A^-1, which changes too.
-    response.stress -= variation.stress() * inverse * strain;
+    const double per_activation = 1 / activation[fit.of_element(pair, element)];
     for (int n = 0; n < Nodes; ++n) {
       Eigen::Matrix<double, Dim, 1> force = response.stress * weights.row(n).template head<Dim>().transpose();
-      if constexpr (Variation::kModes > 0) force += response.force * weights.row(n).template tail<Variation::kModes>().transpose();
-      result.col(pair).segment<Dim>(Dim * n) = -force;
+      if constexpr (kModes > 0) force += response.force * weights.row(n).template tail<kModes>().transpose();
+      result.col(pair).segment<Dim>(Dim * n) = -per_activation * force;
     }
   }
   return result;
@@ -147,19 +189,22 @@ ActiveStrain<Dim> make_active_strain(const ElementBlock<Dim>& block) {
 
 template <int Dim>
 bool set_activation(const ActivationFit<Dim>& fit, const Eigen::VectorXd& activation, ActiveStrain<Dim>& active) {
-  constexpr int kPairsOfBox = (1 << Dim) * ((1 << Dim) - 1) / 2;
-  return fit.of_element.rows() == kPairsOfBox ? set_activation_of<Dim, 1 << Dim>(fit, activation, active)
-                                              : set_activation_of<Dim, Dim + 1>(fit, activation, active);
+  for (const double each : activation) {
+    if (!(each > 0) || !std::isfinite(each)) return false;
+  }
+  if (fit.is_of_boxes()) {
+    set_activation_of<Dim, 1 << Dim>(fit, activation, active);
+  } else {
+    set_activation_of<Dim, Dim + 1>(fit, activation, active);
+  }
+  return true;
 }
 
 template <int Dim>
 Eigen::MatrixXd element_force_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
-                                             const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>& active) {
-  const Eigen::MatrixXd& map = fit.maps[static_cast<std::size_t>(fit.map_of_element[element])];
-  if (block.is_box()) {
-    return force_per_activation(ElementVariation<Dim, 1 << Dim>(block, element, x, &active), block, map, element);
-  }
-  return force_per_activation(ElementVariation<Dim, Dim + 1>(block, element, x, &active), block, map, element);
+                                             const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation) {
+  return block.is_box() ? force_per_activation<Dim, 1 << Dim>(block, fit, element, x, activation)
+                        : force_per_activation<Dim, Dim + 1>(block, fit, element, x, activation);
 }
 
 template ActivationFit<2> make_activation_fit<2>(const ElementMesh<2>&, const ElementConstraints&);
@@ -169,8 +214,8 @@ template ActiveStrain<3> make_active_strain<3>(const ElementBlock<3>&);
 template bool set_activation<2>(const ActivationFit<2>&, const Eigen::VectorXd&, ActiveStrain<2>&);
 template bool set_activation<3>(const ActivationFit<3>&, const Eigen::VectorXd&, ActiveStrain<3>&);
 template Eigen::MatrixXd element_force_per_activation<2>(const ElementBlock<2>&, const ActivationFit<2>&, int,
-                                                         const ConstNodeMatrix<2>&, const ActiveStrain<2>&);
+                                                         const ConstNodeMatrix<2>&, const Eigen::VectorXd&);
 template Eigen::MatrixXd element_force_per_activation<3>(const ElementBlock<3>&, const ActivationFit<3>&, int,
-                                                         const ConstNodeMatrix<3>&, const ActiveStrain<3>&);
+                                                         const ConstNodeMatrix<3>&, const Eigen::VectorXd&);
 
 }  // namespace hydrostat::physics

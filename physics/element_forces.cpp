@@ -64,10 +64,10 @@ struct Sweep {
         const ElementData<Lanes> shape(active->lanes, batch, Active::kSize);
         const typename Kernel::Square inverse = Kernel::active_inverse(shape);
         strain.F = (strain.F * inverse).eval();
-        Kernel::differentiate(block.law, data, &shape, strain, stress, hourglass_force);
+        Kernel::differentiate(block.law, data, Kernel::active_hourglass(shape), strain, stress, hourglass_force);
         stress = (stress * inverse).eval();  // symmetric
       } else {
-        Kernel::differentiate(block.law, data, nullptr, strain, stress, hourglass_force);
+        Kernel::differentiate(block.law, data, Kernel::no_hourglass(), strain, stress, hourglass_force);
       }
       scatter(nodes, Kernel::nodal_forces(data, stress, hourglass_force), force);
     }
@@ -81,9 +81,9 @@ struct Sweep {
       if (active) {
         const ElementData<Lanes> shape(active->lanes, batch, Active::kSize);
         strain.F = (strain.F * Kernel::active_inverse(shape)).eval();
-        sum += Kernel::energy(block.law, data, &shape, strain);
+        sum += Kernel::energy(block.law, data, Kernel::active_hourglass(shape), strain);
       } else {
-        sum += Kernel::energy(block.law, data, nullptr, strain);
+        sum += Kernel::energy(block.law, data, Kernel::no_hourglass(), strain);
       }
     }
     return sum_of(sum);

@@ -95,6 +95,7 @@ struct ElementKernel {
     for (int k = 0; k < Dim * Dim; ++k) inverse(k) = active[Active::kInverse + k];
     return inverse;
   }
+  static Hourglass no_hourglass() { return Hourglass::Constant(Scalar(0.0)); }
   static Hourglass active_hourglass(const Data& active) {
     Hourglass rest;
     for (int k = 0; k < Layout::kCoordinates; ++k) rest(k) = active[Active::kHourglass + k];
@@ -118,19 +119,19 @@ struct ElementKernel {
     return result;
   }
 
-  static Turned turn(const Data& data, const Data* active, const Strain& strain) {
+  /// `rest` is what h is without stress [m].
+  static Turned turn(const Data& data, const Hourglass& rest, const Strain& strain) {
     Turned turned;
     turned.R = nearest_rotation(strain.F);
     turned.U = turned.R.transpose() * strain.F;
     turned.h = turned.R.transpose() * strain.Q;
-    turned.stretch = turned.h;
-    if (active) turned.stretch -= active_hourglass(*active);
+    turned.stretch = turned.h - rest;
     turned.force = stiffness_times(data, turned.stretch);
     turned.spin = solve_spin<Scalar, Dim>(turned.U, moment_of<Scalar, Dim, kModes>(turned.h, turned.force));
     return turned;
   }
 
-  static Scalar energy(ElasticLaw law, const Data& data, const Data* active, const Strain& strain) {
+  static Scalar energy(ElasticLaw law, const Data& data, const Hourglass& rest, const Strain& strain) {
     Scalar energy(0.0);
     if (law == ElasticLaw::kStableNeoHookean) {
       energy = StableNeoHookean<Scalar>(data[Layout::kLambda], data[Layout::kMu]).energy(strain.F);
@@ -138,18 +139,18 @@ struct ElementKernel {
       energy = CorotatedLinear<Scalar>(data[Layout::kLambda], data[Layout::kMu]).energy(strain.F, nearest_rotation(strain.F));
     }
     if constexpr (kModes > 0) {
-      const Turned turned = turn(data, active, strain);
+      const Turned turned = turn(data, rest, strain);
       for (int k = 0; k < Layout::kCoordinates; ++k) energy += Scalar(0.5) * turned.stretch(k) * turned.force(k);
     }
     return energy;
   }
 
   /// Derivatives of the energy with respect to the strain: to F [J] and to Q [N].
-  static void differentiate(ElasticLaw law, const Data& data, const Data* active, const Strain& strain, Square& stress,
+  static void differentiate(ElasticLaw law, const Data& data, const Hourglass& rest, const Strain& strain, Square& stress,
                             Hourglass& force) {
     const Scalar lambda = data[Layout::kLambda], mu = data[Layout::kMu];
     if constexpr (kModes > 0) {
-      const Turned turned = turn(data, active, strain);
+      const Turned turned = turn(data, rest, strain);
       stress = law == ElasticLaw::kStableNeoHookean ? StableNeoHookean<Scalar>(lambda, mu).stress(strain.F)
                                                     : CorotatedLinear<Scalar>(lambda, mu).stress(strain.F, turned.R);
       stress -= turned.R * skew<Scalar, Dim>(turned.spin);

@@ -32,23 +32,27 @@ class ElementVariation {
 
   ElementVariation(const ElementBlock<Dim>& block, int element, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active)
       : law_(block.law), data_(block.lanes, element, Layout::kSize) {
-    typename Kernel::Offsets offset;
-    for (int n = 1; n < Nodes; ++n) offset.col(n - 1) = x.col(block.nodes(n, element)) - x.col(block.nodes(0, element));
-    typename Kernel::Strain strain = Kernel::strain_of(data_, offset);
     if (active) {
       const ElementData<double> shape(active->lanes, element, ActiveLayout<Dim, Nodes>::kSize);
       inverse_ = Kernel::active_inverse(shape);
-      strain.F = (strain.F * inverse_).eval();
-      fill(strain, &shape);
-    } else {
-      fill(strain, nullptr);
+      rest_ = Kernel::active_hourglass(shape);
     }
+    differentiate(block, element, x);
+  }
+  /// The active shape given as the inverse of its stretch and its hourglass coordinates.
+  ElementVariation(const ElementBlock<Dim>& block, int element, const ConstNodeMatrix<Dim>& x, const Square& active_inverse,
+                   const Hourglass& active_hourglass)
+      : law_(block.law), data_(block.lanes, element, Layout::kSize), inverse_(active_inverse), rest_(active_hourglass) {
+    differentiate(block, element, x);
   }
 
   const Square& F() const { return F_; }
   const Square& stress() const { return stress_; }
-  const Hourglass& force() const { return force_; }
-  const Square& active_inverse() const { return inverse_; }
+
+  /// Of the law alone, without the hourglass part.
+  GradientDerivative<Dim> moduli(Definiteness definiteness) const {
+    return stress_derivative<Dim>(law_, {data_[Layout::kLambda], data_[Layout::kMu]}, F_, definiteness);
+  }
 
   /// Row n: what node n adds to F and Q per metre it moves.
   Weights node_weights() const {
@@ -65,11 +69,10 @@ class ElementVariation {
 
   Hessian hessian(Definiteness definiteness) const {
     Hessian result = Hessian::Zero();
-    const Lame lame{data_[Layout::kLambda], data_[Layout::kMu]};
     if constexpr (kModes > 0) {
       definiteness == Definiteness::kExact ? add_exact_hourglass(result) : add_projected_hourglass(result);
     }
-    result.template topLeftCorner<Dim * Dim, Dim * Dim>() += stress_derivative<Dim>(law_, lame, F_, definiteness);
+    result.template topLeftCorner<Dim * Dim, Dim * Dim>() += moduli(definiteness);
     return result;
   }
 
@@ -87,10 +90,15 @@ class ElementVariation {
   }
 
  private:
-  void fill(const typename Kernel::Strain& strain, const ElementData<double>* shape) {
+  void differentiate(const ElementBlock<Dim>& block, int element, const ConstNodeMatrix<Dim>& x) {
+    typename Kernel::Offsets offset;
+    for (int n = 1; n < Nodes; ++n) offset.col(n - 1) = x.col(block.nodes(n, element)) - x.col(block.nodes(0, element));
+    typename Kernel::Strain strain = Kernel::strain_of(data_, offset);
+    strain.F = (strain.F * inverse_).eval();
     F_ = strain.F;
-    Kernel::differentiate(law_, data_, shape, strain, stress_, force_);
-    if constexpr (kModes > 0) turned_ = Kernel::turn(data_, shape, strain);
+    if constexpr (kModes > 0) turned_ = Kernel::turn(data_, rest_, strain);
+    Hourglass force;
+    Kernel::differentiate(law_, data_, rest_, strain, stress_, force);
   }
 
   /// How fast the frame turns: the spin of R when F changes by dF.
@@ -141,8 +149,8 @@ class ElementVariation {
   ElasticLaw law_;
   ElementData<double> data_;
   Square inverse_ = Square::Identity();  // of the active stretch
+  Hourglass rest_ = Hourglass::Zero();
   Square F_, stress_;
-  Hourglass force_;
   typename Kernel::Turned turned_;
 };
 

@@ -59,17 +59,18 @@ constexpr double kLeastSpinStiffness = 1e-3;
 /// Where F has no nearest rotation the result is bounded instead of infinite.
 template <class Scalar, int Dim>
 Spin<Scalar, Dim> solve_spin(const SquareMatrix<Scalar, Dim>& U, const Spin<Scalar, Dim>& m) {
-  const Scalar size_squared = squared_norm(U) + Scalar(1e-300);
+  const Scalar tiny(1e-300);  // for a body collapsed to a point, which has no moment
+  const Scalar size_squared = squared_norm(U);
   if constexpr (Dim == 2) {
     const Scalar trace = U(0, 0) + U(1, 1);
-    return Spin<Scalar, 2>(m[0] * trace / greater_of(trace * trace, size_squared * Scalar(kLeastSpinStiffness)));
+    return Spin<Scalar, 2>(m[0] * trace / greater_of(trace * trace, size_squared * Scalar(kLeastSpinStiffness) + tiny));
   } else {
     const Scalar trace = U(0, 0) + U(1, 1) + U(2, 2);
     SquareMatrix<Scalar, 3> Z = -U;
     for (int i = 0; i < 3; ++i) Z(i, i) += trace;
     const SquareMatrix<Scalar, 3> adjugate = cofactor(Z);  // Z is symmetric
     using std::sqrt;
-    const Scalar least = size_squared * sqrt(size_squared) * Scalar(kLeastSpinStiffness);
+    const Scalar least = size_squared * sqrt(size_squared) * Scalar(kLeastSpinStiffness) + tiny;
     const Scalar scale = Scalar(1) / greater_of(determinant(Z, adjugate), least);
     Spin<Scalar, 3> w;
     for (int i = 0; i < 3; ++i) w[i] = scale * (adjugate(i, 0) * m[0] + adjugate(i, 1) * m[1] + adjugate(i, 2) * m[2]);

@@ -1,0 +1,155 @@
+#include "physics/element_forces.h"
+
+#include "physics/element_kernel.h"
+
+// The sweeps are compiled twice, for every processor and for those with AVX2 and fused multiply-add, and chosen at run time:
+// results then depend on the processor, never on the threads. Sanitizers take the plain one (their checks do not inline).
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define HYDROSTAT_FLATTEN [[gnu::flatten]]
+#define HYDROSTAT_WIDE [[gnu::flatten, gnu::target("avx2,fma")]]
+#else
+#define HYDROSTAT_FLATTEN
+#endif
+
+namespace hydrostat::physics {
+namespace {
+
+/// One pass over a range of batches.
+template <int Dim, int Nodes>
+struct Sweep {
+  using Kernel = ElementKernel<Lanes, Dim, Nodes>;
+  using Layout = ElementLayout<Dim, Nodes>;
+  using Active = ActiveLayout<Dim, Nodes>;
+
+  const ElementBlock<Dim>& block;
+  const double* x;
+  const ActiveStrain<Dim>* active;
+  BatchRange range;
+
+  const int* nodes_of(int batch) const { return &block.lane_nodes[static_cast<std::size_t>(batch) * Nodes * Lanes::kCount]; }
+
+  typename Kernel::Offsets gather(const int* nodes) const {
+    typename Kernel::Offsets offset;
+    for (int i = 0; i < Dim; ++i) {
+      Lanes first;
+      for (int lane = 0; lane < Lanes::kCount; ++lane) first.value[lane] = x[Dim * nodes[lane] + i];
+      for (int n = 1; n < Nodes; ++n) {
+        Lanes here;
+        for (int lane = 0; lane < Lanes::kCount; ++lane) here.value[lane] = x[Dim * nodes[Lanes::kCount * n + lane] + i];
+        offset(i, n - 1) = here - first;
+      }
+    }
+    return offset;
+  }
+
+  static void scatter(const int* nodes, const typename Kernel::Offsets& forces, double* force) {
+    for (int i = 0; i < Dim; ++i) {
+      Lanes balance(0.0);
+      for (int n = 1; n < Nodes; ++n) balance -= forces(i, n - 1);
+      for (int lane = 0; lane < Lanes::kCount; ++lane) {
+        force[Dim * nodes[lane] + i] += balance[lane];
+        for (int n = 1; n < Nodes; ++n) force[Dim * nodes[Lanes::kCount * n + lane] + i] += forces(i, n - 1)[lane];
+      }
+    }
+  }
+
+  void add_forces(double* force) const {
+    for (int batch = range.first; batch < range.end; ++batch) {
+      const int* const nodes = nodes_of(batch);
+      const ElementData<Lanes> data(block.lanes, batch, Layout::kSize);
+      typename Kernel::Strain strain = Kernel::strain_of(data, gather(nodes));
+      typename Kernel::Square stress;
+      typename Kernel::Hourglass hourglass_force;
+      if (active) {
+        const ElementData<Lanes> shape(active->lanes, batch, Active::kSize);
+        const typename Kernel::Square inverse = Kernel::active_inverse(shape);
+        strain.F = (strain.F * inverse).eval();
+        Kernel::differentiate(block.law, data, Kernel::active_hourglass(shape), strain, stress, hourglass_force);
+        stress = (stress * inverse).eval();  // symmetric
+      } else {
+        Kernel::differentiate(block.law, data, Kernel::no_hourglass(), strain, stress, hourglass_force);
+      }
+      scatter(nodes, Kernel::nodal_forces(data, stress, hourglass_force), force);
+    }
+  }
+
+  double energy() const {
+    Lanes sum(0.0);
+    for (int batch = range.first; batch < range.end; ++batch) {
+      const ElementData<Lanes> data(block.lanes, batch, Layout::kSize);
+      typename Kernel::Strain strain = Kernel::strain_of(data, gather(nodes_of(batch)));
+      if (active) {
+        const ElementData<Lanes> shape(active->lanes, batch, Active::kSize);
+        strain.F = (strain.F * Kernel::active_inverse(shape)).eval();
+        sum += Kernel::energy(block.law, data, Kernel::active_hourglass(shape), strain);
+      } else {
+        sum += Kernel::energy(block.law, data, Kernel::no_hourglass(), strain);
+      }
+    }
+    return sum_of(sum);
+  }
+};
+
+template <int Dim, int Nodes>
+HYDROSTAT_FLATTEN void add_forces(const Sweep<Dim, Nodes>& sweep, double* force) {
+  sweep.add_forces(force);
+}
+template <int Dim, int Nodes>
+HYDROSTAT_FLATTEN double energy(const Sweep<Dim, Nodes>& sweep) {
+  return sweep.energy();
+}
+
+#ifdef HYDROSTAT_WIDE
+template <int Dim, int Nodes>
+HYDROSTAT_WIDE void add_forces_wide(const Sweep<Dim, Nodes>& sweep, double* force) {
+  sweep.add_forces(force);
+}
+template <int Dim, int Nodes>
+HYDROSTAT_WIDE double energy_wide(const Sweep<Dim, Nodes>& sweep) {
+  return sweep.energy();
+}
+bool processor_is_wide() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+#endif
+
+template <int Dim, int Nodes>
+void add_forces_here(const Sweep<Dim, Nodes>& sweep, double* force) {
+#ifdef HYDROSTAT_WIDE
+  static const bool is_wide = processor_is_wide();
+  if (is_wide) return add_forces_wide(sweep, force);
+#endif
+  add_forces(sweep, force);
+}
+
+template <int Dim, int Nodes>
+double energy_here(const Sweep<Dim, Nodes>& sweep) {
+#ifdef HYDROSTAT_WIDE
+  static const bool is_wide = processor_is_wide();
+  if (is_wide) return energy_wide(sweep);
+#endif
+  return energy(sweep);
+}
+
+}  // namespace
+
+template <int Dim>
+double element_energy(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
+                      BatchRange range) {
+  if (block.is_box()) return energy_here(Sweep<Dim, 1 << Dim>{block, x.data(), active, range});
+  return energy_here(Sweep<Dim, Dim + 1>{block, x.data(), active, range});
+}
+
+template <int Dim>
+void add_element_forces(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
+                        BatchRange range, NodeMatrix<Dim>& force) {
+  if (block.is_box()) return add_forces_here(Sweep<Dim, 1 << Dim>{block, x.data(), active, range}, force.data());
+  add_forces_here(Sweep<Dim, Dim + 1>{block, x.data(), active, range}, force.data());
+}
+
+template double element_energy<2>(const ElementBlock<2>&, const ConstNodeMatrix<2>&, const ActiveStrain<2>*, BatchRange);
+template double element_energy<3>(const ElementBlock<3>&, const ConstNodeMatrix<3>&, const ActiveStrain<3>*, BatchRange);
+template void add_element_forces<2>(const ElementBlock<2>&, const ConstNodeMatrix<2>&, const ActiveStrain<2>*, BatchRange,
+                                    NodeMatrix<2>&);
+template void add_element_forces<3>(const ElementBlock<3>&, const ConstNodeMatrix<3>&, const ActiveStrain<3>*, BatchRange,
+                                    NodeMatrix<3>&);
+
+}  // namespace hydrostat::physics

@@ -19,6 +19,7 @@
 #include "io/stage_records.h"
 #include "retarget/com_path.h"
 #include "retarget/error.h"
+#include "retarget/flight.h"
 #include "retarget/run_warnings.h"
 
 namespace hydrostat::cli {
@@ -226,9 +227,18 @@ class Conversion {
       return retarget::solve_inverse_dynamics(prepared, scene, creature_.length, inverse_options);
     });
     add_warnings(prepared.warnings);
+    warn_of_flights(prepared);
     add_warnings(retarget::target_warnings(prepared, scene.body, inverse_options.limit, wished_limit == 0));
     add_warnings(retarget::inverse_warnings(inverse_.report));
     target_.performer = make_performer(creature_, motion_, std::move(prepared));
+  }
+
+  void warn_of_flights(const retarget::PreparedTarget& prepared) {
+    const Eigen::Matrix3Xd path = retarget::com_path(motion_.nodes, creature_.scene.body.mass);
+    const auto& vertices = creature_.character.skin.vertices;
+    add_warnings(retarget::flight_warnings(
+        retarget::flights(prepared.contacts, motion_.nodes, path, creature_.scene.gravity.norm()), motion_.nodes.rate_hz,
+        vertices.row(1).maxCoeff() - vertices.row(1).minCoeff(), creature_.length));
   }
 
   void solve_signals() {

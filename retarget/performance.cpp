@@ -9,7 +9,6 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kVariation = 0.02;  // of mass, friction and stiffness
 constexpr double kErrorSeconds = 1;  // at most, over which the substep's error is measured
 
 using FeedForward = std::function<void(double, Eigen::VectorXd&)>;
@@ -44,10 +43,10 @@ Replay run(const Performer& performer, const physics::Scene& plant, const FeedFo
 
 }  // namespace
 
-Variation variation_of(unsigned seed) {
+Variation variation_of(unsigned seed, double most) {
   if (seed == 0) return {};
   std::mt19937 generator(seed);
-  const auto factor = [&generator] { return 1 + kVariation * (2 * (static_cast<double>(generator()) / 4294967295.0) - 1); };
+  const auto factor = [&generator, most] { return 1 + most * (2 * (static_cast<double>(generator()) / 4294967295.0) - 1); };
   Variation variation;
   variation.mass = factor();
   variation.friction = factor();
@@ -66,7 +65,7 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 }
 
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  const physics::Scene plant = varied_scene(performer.scene, variation_of(options.seed));
+  const physics::Scene plant = varied_scene(performer.scene, variation_of(options.seed, options.variation));
   ReplayOptions baseline = options.replay;
   baseline.correct = baseline.trace = false;
   Performances result;

@@ -26,7 +26,8 @@ struct Performer {
 /// Which free runs are wanted, and how.
 struct PerformOptions {
   ReplayOptions replay;    // `correct` is the run's own; the trace is of the closed loop, or of the open loop where that is the main run
-  unsigned seed = 0;       // 0: the body as it was planned; else see varied_scene
+  unsigned seed = 0;       // 0: the body as it was planned; else see variation_of
+  double variation = 0.02; // how far a seed's body may differ from the plan
   bool closed_loop = true; // false: the open loop is the main run
   bool baselines = true;   // naive, and the open loop beside the closed one
   int threads = 2;         // two let the baselines run beside the main run; the outcome does not hang on it
@@ -46,8 +47,8 @@ struct Variation {
   double mass = 1, friction = 1, stiffness = 1;
 };
 
-/// Factors drawn evenly within 2 % of 1 by the seed; seed 0 is exactly 1.
-Variation variation_of(unsigned seed);
+/// Factors drawn evenly within `most` of 1 by the seed; seed 0 is exactly 1.
+Variation variation_of(unsigned seed, double most = PerformOptions().variation);
 
 /// The scene with another body of the same shape.
 physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation);

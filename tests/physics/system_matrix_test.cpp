@@ -69,7 +69,7 @@ TYPED_TEST(SystemMatrices, DampingIsTheSlopeOfTheDashpots) {
     SystemMatrixOf<Dim> matrix = zero_matrix(body);
     matrix.add_damping(body, x, 1);
     const auto force = [&](const PointsOf<Dim>& v) {
-      PointsOf<Dim> sum = PointsOf<Dim>::Zero(3, v.cols());
+      PointsOf<Dim> sum = PointsOf<Dim>::Zero(Dim, v.cols());
       add_damping_forces(body, x, v, sum);
       return sum;
     };

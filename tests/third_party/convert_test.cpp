@@ -57,10 +57,13 @@ TEST(ThirdPartyClips, TheFrogThatCannotHopSaysWhatStopsIt) {
   const TemporaryDirectory directory;
   const Outcome outcome = hydrostat_in(directory.path, "convert " + in_quotes(file) + " -o creature --quiet --clip Frog_Jump");
   EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
-  const std::string cause = report_of(directory.path / "creature")["replay"]["closed_loop"]["fall_cause"];
+  const json report = report_of(directory.path / "creature");
+  const std::string cause = report["replay"]["closed_loop"]["fall_cause"], warnings = report["warnings"].dump();
   EXPECT_NE(cause.find("frame "), std::string::npos) << cause;
   EXPECT_NE(cause.find("limb '"), std::string::npos) << cause;
   EXPECT_NE(cause.find("limit"), std::string::npos) << cause;
+  EXPECT_NE(warnings.find("rises by"), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("give --height 0."), std::string::npos) << "the mend; " << warnings;
 }
 
 }  // namespace

@@ -1,0 +1,120 @@
+// One free run of the balance bench: a creature, a variant of the corrector, a seed, a push; one row of balance.csv on standard output.
+// tests/balance/run.sh calls it for all of them. Usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json]
+// SEED draws mass, friction and stiffness within 10 % of the plan and a shove of up to 0.1 m/s at the start; 0 is the plan itself.
+// PUSH is "none" or DIRECTION:PHASE:SPEED, the direction in eighths of a turn, the phase in quarters of a cycle, the speed in m/s.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <random>
+#include <sstream>
+
+#include "io/load_creature.h"
+#include "retarget/error.h"
+#include "retarget/performance.h"
+
+namespace hydrostat {
+namespace {
+
+constexpr double kVariation = 0.1;      // of mass, friction and stiffness
+constexpr double kFirstShove = 0.1;     // [m/s] at most
+constexpr double kPushCycle = 2;        // in which the push comes; seconds where a clip is played once
+constexpr int kEighths = 8, kQuarters = 4;
+
+/// The correctors that are compared; "usual" is what convert uses.
+const std::map<std::string, retarget::CorrectorOptions>& variants() {
+  static const std::map<std::string, retarget::CorrectorOptions> table = [] {
+    std::map<std::string, retarget::CorrectorOptions> made;
+    const retarget::CorrectorOptions usual;
+    made["usual"] = usual;
+    made["effort_1"] = made["effort_10"] = made["settle_0.15"] = made["settle_0.6"] = made["nodes_0.4"] = made["root_12"] = usual;
+    made["effort_1"].effort = 1;
+    made["effort_10"].effort = 10;
+    made["settle_0.15"].settle_s = 0.15;
+    made["settle_0.6"].settle_s = 0.6;
+    made["nodes_0.4"].node_weight = 0.4;
+    made["root_12"].root_weight = 12;
+    return made;
+  }();
+  return table;
+}
+
+retarget::Push shove(double time_s, double angle, double speed) {
+  retarget::Push push;
+  push.time_s = time_s;
+  push.delta_v = speed * Eigen::Vector3d(std::cos(angle), 0, std::sin(angle));
+  return push;
+}
+
+/// From "DIRECTION:PHASE:SPEED". `period_s` is a cycle's.
+retarget::Push parse_push(const std::string& text, double period_s) {
+  int direction = 0, phase = 0;
+  double speed = 0;
+  if (std::sscanf(text.c_str(), "%d:%d:%lf", &direction, &phase, &speed) != 3) {
+    throw Error("balance_run", "PUSH", "'" + text + "' is not DIRECTION:PHASE:SPEED", "Write it like 2:1:0.5, or 'none'.");
+  }
+  return shove((kPushCycle + static_cast<double>(phase) / kQuarters) * period_s, 2 * M_PI * direction / kEighths, speed);
+}
+
+/// Every third frame of the nodes, for the page's looping pictures.
+void write_frames(const std::string& file, const retarget::Performer& performer, const retarget::Motion& motion) {
+  std::ofstream out(file);
+  out.precision(4);
+  out << "{\"rate_hz\":" << motion.rate_hz / 3 << ",\"edges\":[";
+  const auto& edges = performer.scene.body.edges;
+  for (Eigen::Index e = 0; e < edges.cols(); ++e) out << (e ? "," : "") << edges(0, e) << "," << edges(1, e);
+  out << "],\"frames\":[";
+  for (Eigen::Index f = 0; f < motion.count(); f += 3) {
+    out << (f ? ",[" : "[");
+    for (Eigen::Index r = 0; r < motion.frames.rows(); ++r) out << (r ? "," : "") << motion.frames(r, f) / performer.length;
+    out << "]";
+  }
+  out << "]}\n";
+}
+
+int run(int argc, char** argv) {
+  if (argc < 6) {
+    std::cerr << "usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json]\n";
+    return 2;
+  }
+  const std::string directory = argv[1], variant = argv[2], push = argv[4];
+  const auto seed = static_cast<unsigned>(std::atoi(argv[3]));
+  const auto entry = variants().find(variant);
+  if (entry == variants().end()) throw Error("balance_run", "VARIANT", "there is no '" + variant + "'", "See variants() in its source.");
+  const io::LoadedCreature creature = io::load_creature(directory);
+  const retarget::Performer& performer = creature.target.performer;
+  const retarget::Motion& target = performer.prepared.target;
+  retarget::PerformOptions options;
+  options.replay.corrector = entry->second;
+  options.replay.duration_s = target.loop ? std::atof(argv[5]) * target.duration_s() : retarget::usual_duration(target);
+  options.baselines = false;
+  options.threads = 1;
+  options.seed = seed;
+  options.variation = kVariation;
+  std::mt19937 random(seed);
+  const double angle = 2 * M_PI * static_cast<double>(random()) / 4294967296.0;
+  if (seed != 0) options.replay.pushes.push_back(shove(0, angle, kFirstShove * static_cast<double>(random()) / 4294967296.0));
+  if (push != "none") options.replay.pushes.push_back(parse_push(push, target.loop ? target.duration_s() : 0.25));
+  const retarget::Replay replay = *retarget::perform(performer, creature.signals, options).closed_loop;
+  const retarget::ReplayReport& r = replay.report;
+  const double travel = r.clip_travel_per_cycle_length != 0 ? r.travel_per_cycle_length / r.clip_travel_per_cycle_length : 1;
+  std::printf("%s,%d,%.4g,%.3f,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g\n", r.fell ? "fell" : "up", target.loop ? 1 : 0, r.cycles,
+              r.fell ? r.fall_time_s : r.duration_s, r.shape_rms_length, r.clip_shape_rms_length, r.drift_per_cycle_length,
+              r.heading_deg_per_cycle, travel, r.slip_per_stance_length, r.penetration_max_size, r.real_time_factor);
+  if (argc > 6) write_frames(argv[6], performer, replay.motion);
+  return 0;
+}
+
+}  // namespace
+}  // namespace hydrostat
+
+int main(int argc, char** argv) {
+  try {
+    return hydrostat::run(argc, argv);
+  } catch (const hydrostat::Error& error) {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
+}

@@ -1,0 +1,105 @@
+// Writes DIR/balance.html from DIR/balance.csv and DIR/frames: a table of survival and medians, survival curves, looping pictures.
+// Prints the table as well. Usage: node page.mjs DIR
+import { existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+
+const directory = process.argv[2];
+const [head, ...lines] = readFileSync(join(directory, "balance.csv"), "utf8").trim().split("\n");
+const names = head.split(",");
+const rows = lines.map((line) => Object.fromEntries(line.split(",").map((value, k) => [names[k], value])));
+
+const median = (values) => {
+  const sorted = values.map(Number).sort((a, b) => a - b);
+  const middle = sorted.length >> 1;
+  return sorted.length === 0 ? NaN : sorted.length % 2 ? sorted[middle] : (sorted[middle - 1] + sorted[middle]) / 2;
+};
+const grouped = new Map();
+for (const row of rows) {
+  const key = `${row.clip},${row.variant}`;
+  if (!grouped.has(key)) grouped.set(key, { clip: row.clip, variant: row.variant, seeds: [], pushes: [] });
+  grouped.get(key)[row.push === "none" ? "seeds" : "pushes"].push(row);
+}
+const summary = [...grouped.values()].map(({ clip, variant, seeds, pushes }) => {
+  const of = (name) => median(seeds.filter((row) => row.outcome === "up").map((row) => row[name]));
+  return {
+    clip,
+    variant,
+    up: `${seeds.filter((row) => row.outcome === "up").length}/${seeds.length}`,
+    pushes: `${pushes.filter((row) => row.outcome === "up").length}/${pushes.length}`,
+    "median s up": median(seeds.map((row) => row.time_s)),
+    "shape %L": 100 * of("shape"),
+    "clip shape %L": 100 * of("clip_shape"),
+    "drift %L": 100 * of("drift"),
+    "heading deg": of("heading_deg"),
+    travel: of("travel"),
+    "slip %L": 100 * of("slip"),
+    "x real time": median(seeds.map((row) => row.real_time_factor)),
+  };
+});
+const shown = (value) => (typeof value === "number" ? (Number.isNaN(value) ? "-" : String(+value.toPrecision(3))) : value);
+console.table(Object.fromEntries(summary.map(({ clip, variant, ...rest }) => [`${clip} ${variant}`,
+  Object.fromEntries(Object.entries(rest).map(([name, value]) => [name, shown(value)]))])));
+
+// Survival: the share of the seeds that are still up, over the share of the time that was asked.
+const kColours = ["#2563eb", "#dc2626", "#059669", "#d97706", "#7c3aed", "#0891b2", "#be185d", "#4d7c0f"];
+const variants = [...new Set(rows.map((row) => row.variant))];
+function curve(seeds) {
+  const longest = Math.max(...seeds.map((row) => Number(row.time_s)));
+  const falls = seeds.filter((row) => row.outcome === "fell").map((row) => Number(row.time_s) / longest).sort((a, b) => a - b);
+  let path = "M0 0";
+  falls.forEach((at, k) => (path += `H${(at * 100).toFixed(2)}V${((100 * (k + 1)) / seeds.length).toFixed(2)}`));
+  return `${path}H100`;
+}
+const clips = [...new Set(rows.map((row) => row.clip))];
+const charts = clips.map((clip) => {
+  const curves = [...grouped.values()].filter((group) => group.clip === clip && group.seeds.length > 0)
+    .map((group) => `<path d="${curve(group.seeds)}" stroke="${kColours[variants.indexOf(group.variant) % kColours.length]}"/>`);
+  const pictures = variants.filter((variant) => existsSync(join(directory, "frames", `${clip},${variant}.json`)))
+    .map((variant) => `<figure><canvas width="300" height="150" data-frames='${readFileSync(join(directory, "frames", `${clip},${variant}.json`), "utf8").trim()}'></canvas><figcaption>${variant}, seed 1</figcaption></figure>`);
+  return `<section><h2>${clip}</h2><svg viewBox="-2 -4 104 108" preserveAspectRatio="none">${curves.join("")}</svg>${pictures.join("")}</section>`;
+});
+const columns = Object.keys(summary[0] ?? {});
+const table = `<table><tr>${columns.map((name) => `<th>${name}</th>`).join("")}</tr>${summary.map((row) =>
+  `<tr>${columns.map((name) => `<td>${shown(row[name])}</td>`).join("")}</tr>`).join("")}</table>`;
+const legend = variants.map((variant, k) => `<span style="color:${kColours[k % kColours.length]}">&#9632; ${variant}</span>`).join(" ");
+const page = `<!doctype html><meta charset="utf-8"><title>Balance</title>
+<style>body{font:14px system-ui;margin:2em;max-width:1300px}table{border-collapse:collapse}td,th{padding:2px 10px;text-align:right;border-bottom:1px solid #ddd}
+section{display:inline-block;vertical-align:top;margin:1em 2em 1em 0;width:300px}svg{width:300px;height:120px;border:1px solid #999}
+path{fill:none;stroke-width:1.5;vector-effect:non-scaling-stroke}figure{margin:4px 0}canvas{background:#f4f4f5}</style>
+<h1>Balance</h1><p>Seeds differ from the plan by up to 10 % in mass, friction and stiffness and get a shove of up to 0.1 m/s at the start.
+Curves: share of the seeds still up over the time that was asked. ${legend}</p>${table}${charts.join("")}
+<script>
+for (const canvas of document.querySelectorAll("canvas")) {
+  const { rate_hz, edges, frames } = JSON.parse(canvas.dataset.frames), pen = canvas.getContext("2d");
+  const nodes = frames[0].length / 3;
+  const draw = (now) => {
+    const x = frames[Math.floor((now / 1000) * rate_hz) % frames.length];
+    let middle = [0, 0];
+    for (let i = 0; i < nodes; ++i) middle = [middle[0] + x[3 * i] / nodes, middle[1] + x[3 * i + 2] / nodes];
+    const place = (i) => {  // from the side and a little above, the view going along
+      const a = x[3 * i] - middle[0], b = x[3 * i + 2] - middle[1];
+      return [150 + 110 * (0.5 * a + 0.87 * b), 130 - 110 * (x[3 * i + 1] + 0.25 * (0.87 * a - 0.5 * b))];
+    };
+    pen.clearRect(0, 0, 300, 150);
+    pen.strokeStyle = "#a1a1aa";
+    for (let k = -9; k < 9; ++k) {  // marks on the ground that stay where they are
+      const z = k * 0.5 - ((middle[1] % 0.5) + 0.5) % 0.5;
+      pen.strokeRect(150 + 110 * 0.87 * z, 131, 8, 1);
+    }
+    pen.strokeStyle = "#1e3a8a";
+    pen.globalAlpha = 0.35;
+    pen.beginPath();
+    for (let e = 0; e < edges.length; e += 2) {
+      pen.moveTo(...place(edges[e]));
+      pen.lineTo(...place(edges[e + 1]));
+    }
+    pen.stroke();
+    pen.globalAlpha = 1;
+    requestAnimationFrame(draw);
+  };
+  requestAnimationFrame(draw);
+}
+</script>
+`;
+writeFileSync(join(directory, "balance.html.part"), page);
+renameSync(join(directory, "balance.html.part"), join(directory, "balance.html"));

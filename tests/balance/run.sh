@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# The balance bench: how long creatures keep their feet, over clips, seeds, pushes and variants of the corrector.
+#   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-j JOBS]
+# Writes DIR/balance.csv and DIR/balance.html (default DIR: out/balance). A run that is there is not run again; one that was
+# broken off goes on where it was. -p SPEED adds, for the plan's body, pushes of so many m/s in 8 directions at 4 phases.
+set -euo pipefail
+project=$(dirname -- "$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")")
+assets=${HYDROSTAT_ASSETS:-$project/../shared/assets}
+out=$project/out/balance clips="" variants=usual seeds=20 cycles=50 speed="" jobs=$(nproc)
+while getopts o:c:v:s:n:p:j: option; do
+  case $option in
+    o) out=$(realpath -m -- "$OPTARG") ;;
+    c) clips=$OPTARG ;;
+    v) variants=$OPTARG ;;
+    s) seeds=$OPTARG ;;
+    n) cycles=$OPTARG ;;
+    p) speed=$OPTARG ;;
+    j) jobs=$OPTARG ;;
+    *) exit 2 ;;
+  esac
+done
+
+# name|file|options of 'hydrostat convert'
+table="worm|$project/samples/worm_crawl.glb|
+trot|$project/samples/boxdog_trot.fbx|
+jump|$project/samples/boxdog_jump.glb|
+fox_walk|$assets/gltf/fox.glb|--clip Walk --height 0.6
+fox_run|$assets/gltf/fox.glb|--clip Run --height 0.6
+frog|$assets/fbx/frog.fbx|--clip Frog_Jump --height 0.15
+snake|$assets/gltf/snake.glb|--clip 'Side winding'
+slime|$assets/fbx/slime.fbx|--clip Slime_Walk
+cesium_man|$assets/gltf/cesium_man.gltf|
+spider|$assets/gltf/spider_animated.gltf|"
+
+cd -- "$project"
+cmake --preset release > /dev/null
+cmake --build --preset release --target hydrostat balance_run -j "$jobs" | tail -n 1
+mkdir -p -- "$out/creatures" "$out/rows" "$out/frames"
+program=$(sha256sum build/release/hydrostat | cut -c 1-16)
+
+names=()
+while IFS='|' read -r name file options; do
+  if [ -n "$clips" ] && [[ " $clips " != *" $name "* ]]; then continue; fi
+  if [ ! -f "$file" ]; then
+    echo "$name: left out, $file is missing (set HYDROSTAT_ASSETS)"
+    continue
+  fi
+  names+=("$name")
+  # A creature of another program would be another creature.
+  if [ "$(cat "$out/creatures/$name.made_by" 2> /dev/null)" != "$program" ]; then
+    echo "converting $name"
+    outcome=0
+    eval "build/release/hydrostat convert '$file' -o '$out/creatures/$name' --quiet $options" > /dev/null || outcome=$?
+    if [ "$outcome" != 0 ] && [ "$outcome" != 3 ]; then
+      echo "$name: cannot be converted" >&2
+      exit 1
+    fi
+    rm -f -- "$out/rows/$name,"* "$out/frames/$name,"*
+    echo "$program" > "$out/creatures/$name.made_by"
+  fi
+done <<< "$table"
+
+# One line a run: its name, which is its key in the table.
+cases() {
+  for seed in $(seq 1 "$seeds"); do
+    for name in "${names[@]}"; do
+      for variant in $variants; do echo "$name,$variant,$seed,none,$cycles"; done
+    done
+  done
+  [ -n "$speed" ] || return 0
+  for direction in 0 1 2 3 4 5 6 7; do
+    for phase in 0 1 2 3; do
+      for name in "${names[@]}"; do
+        for variant in $variants; do echo "$name,$variant,0,$direction:$phase:$speed,12"; done
+      done
+    done
+  done
+}
+run_case() {  # out name,variant,seed,push,cycles
+  local row=$1/rows/$2 frames=()
+  [ ! -f "$row" ] || return 0
+  IFS=, read -r name variant seed push cycles <<< "$2"
+  [ "$seed" != 1 ] || frames=("$1/frames/$name,$variant.json")
+  build/release/tests/balance_run "$1/creatures/$name" "$variant" "$seed" "$push" "$cycles" "${frames[@]}" > "$row.part"
+  mv -- "$row.part" "$row"
+}
+export -f run_case
+cases | xargs -d '\n' -P "$jobs" -I CASE bash -c 'run_case "$@"' _ "$out" CASE
+
+{
+  echo "clip,variant,seed,push,cycles_wanted,outcome,loop,cycles,time_s,shape,clip_shape,drift,heading_deg,travel,slip,penetration,real_time_factor"
+  cases | while read -r case; do echo "$case,$(cat -- "$out/rows/$case")"; done
+} > "$out/balance.csv.part"
+mv -- "$out/balance.csv.part" "$out/balance.csv"
+node tests/balance/page.mjs "$out"
+echo "$out/balance.csv"
+echo "file://$out/balance.html"

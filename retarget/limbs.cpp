@@ -15,12 +15,12 @@ std::vector<int> way_to_root(const Skeleton& skeleton, int bone) {
 
 }  // namespace
 
-Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> bones_of_different_limbs(const Skeleton& skeleton) {
+LimbTable bones_of_different_limbs(const Skeleton& skeleton) {
   constexpr std::ptrdiff_t kFar = 4;  // bones: thigh to thigh is 2 or 3, shin to shin 4
   const int count = skeleton.count();
   std::vector<std::vector<int>> ways;
   for (int b = 0; b < count; ++b) ways.push_back(way_to_root(skeleton, b));
-  Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> different(count, count);
+  LimbTable different(count, count);
   different.setConstant(false);
   for (int a = 0; a < count; ++a) {
     for (int b = a + 1; b < count; ++b) {

@@ -6,9 +6,12 @@
 
 namespace hydrostat::retarget {
 
-/// For each pair of bones whether they belong to different limbs: neither is the other's ancestor and the way between them
-/// along the skeleton is four bones or longer. Bones of different roots are not told apart. Returns B x B, symmetric.
-Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> bones_of_different_limbs(const Skeleton& skeleton);
+/// For each pair of bones whether they belong to different limbs; B x B, symmetric.
+using LimbTable = Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic>;
+
+/// Bones belong to different limbs where neither is the other's ancestor and the way between them along the skeleton is four
+/// bones or longer. Bones of different roots are not told apart.
+LimbTable bones_of_different_limbs(const Skeleton& skeleton);
 
 /// The bone of greatest weight of each skin vertex, the first of equals; V.
 Eigen::VectorXi dominant_bones(const SkinnedMesh& skin);

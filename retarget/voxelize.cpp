@@ -8,8 +8,10 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <utility>
+
+#include "retarget/at.h"
+#include "retarget/disjoint_sets.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -41,12 +43,6 @@ std::vector<int> welded_vertices(const Eigen::Matrix3Xd& vertices) {
     weld[static_cast<std::size_t>(v)] = first.emplace(key, v).first->second;
   }
   return weld;
-}
-
-int root_of(std::vector<int>& parent, int i) {
-  auto at = [&](int k) -> int& { return parent[static_cast<std::size_t>(k)]; };
-  while (at(i) != i) i = at(i) = at(at(i));
-  return i;
 }
 
 double triangle_area(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
@@ -131,19 +127,13 @@ void flood_from_outside(Flood& grid) {
 
 TriangleSoup with_closed_holes(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix3Xi& triangles) {
   std::vector<int> weld = welded_vertices(vertices);
-  std::vector<int> shell(weld.size());
-  std::iota(shell.begin(), shell.end(), 0);
+  DisjointSets shells(static_cast<int>(weld.size()));
   for (Eigen::Index t = 0; t < triangles.cols(); ++t) {
-    for (int k = 1; k < 3; ++k) {
-      const int a = root_of(shell, weld[static_cast<std::size_t>(triangles(0, t))]);
-      const int b = root_of(shell, weld[static_cast<std::size_t>(triangles(k, t))]);
-      shell[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
-    }
+    for (int k = 1; k < 3; ++k) shells.join(at(weld, triangles(0, t)), at(weld, triangles(k, t)));
   }
   std::vector<double> shell_area(weld.size(), 0);
   for (Eigen::Index t = 0; t < triangles.cols(); ++t) {
-    const int root = root_of(shell, weld[static_cast<std::size_t>(triangles(0, t))]);
-    shell_area[static_cast<std::size_t>(root)] +=
+    at(shell_area, shells.root(at(weld, triangles(0, t)))) +=
         triangle_area(vertices.col(triangles(0, t)), vertices.col(triangles(1, t)), vertices.col(triangles(2, t)));
   }
 
@@ -157,7 +147,7 @@ TriangleSoup with_closed_holes(const Eigen::Matrix3Xd& vertices, const Eigen::Ma
       length += (vertices.col(rim[(i + 1) % rim.size()]) - vertices.col(rim[i])).norm();
     }
     const double widest_lid = length * length / (4 * std::numbers::pi);
-    if (widest_lid > 0.55 * shell_area[static_cast<std::size_t>(root_of(shell, rim[0]))]) continue;
+    if (widest_lid > 0.55 * at(shell_area, shells.root(rim[0]))) continue;
     const int hub = static_cast<int>(vertices.cols() + static_cast<Eigen::Index>(middles.size()));
     middles.push_back(middle);
     for (std::size_t i = 0; i < rim.size(); ++i) lids.emplace_back(rim[i], rim[(i + 1) % rim.size()], hub);

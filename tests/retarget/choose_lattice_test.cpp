@@ -1,0 +1,56 @@
+#include "retarget/choose_lattice.h"
+
+#include <gtest/gtest.h>
+
+#include "shapes.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+TEST(FittedLattice, SpansTheBoxExactly) {
+  const SkinnedMesh skin = box_skin({-1, 0.5, 2}, {0.2, 1.25, 5});
+  const Lattice lattice = fitted_lattice(skin, {3, 2, 6}, 10);
+  EXPECT_LT((lattice.origin - Eigen::Vector3d(-1, 0.5, 2)).norm(), 1e-15);
+  EXPECT_LT(
+      (lattice.origin + lattice.cell_size.cwiseProduct(lattice.cells.cast<double>()) - Eigen::Vector3d(0.2, 1.25, 5)).norm(),
+      1e-14);
+}
+
+TEST(FittedLattice, LaysASheetInTheMiddleOfItsLayerOrOnItsBottom) {
+  const Lattice upright = fitted_lattice(box_skin({0, 0, 0.5}, {1, 1, 0.5}), {4, 4, 1}, 10);
+  EXPECT_NEAR(upright.cell_size[2], 0.75 * 0.25, 1e-15);
+  EXPECT_NEAR(upright.origin[2] + 0.5 * upright.cell_size[2], 0.5, 1e-15);
+  const Lattice lying = fitted_lattice(box_skin({0, 0.5, 0}, {1, 0.5, 1}), {4, 1, 4}, 10);
+  EXPECT_EQ(lying.origin[1], 0.5);
+}
+
+TEST(RankedLattices, AreNearCubesWithTheWantedNodesFirst) {
+  const SkinnedMesh brick = box_skin({0, 0, 0}, {0.3, 0.7, 1.2});
+  const TriangleSoup closed = with_closed_holes(brick.vertices, brick.triangles);
+  for (const int wanted : {60, 150, 400}) {
+    SCOPED_TRACE(wanted);
+    const std::vector<Eigen::Vector3i> lattices = ranked_lattices(brick, closed, {.nodes = wanted});
+    ASSERT_FALSE(lattices.empty());
+    for (const Eigen::Vector3i& cells : lattices) {
+      const Eigen::Vector3d size = fitted_lattice(brick, cells, 1).cell_size;
+      EXPECT_LE(size.maxCoeff(), 1.4 * size.minCoeff() * (1 + 1e-9));
+    }
+    EXPECT_NEAR(1.0 * (lattices[0].array() + 1).prod() / wanted, 1, 0.2);  // a full brick uses every node
+  }
+}
+
+TEST(Misfit, PrefersFullCubesOfTheWantedNumber) {
+  const Eigen::Vector3d cube(1, 1, 1), slab(1, 1.3, 1);
+  for (const int wanted : {0, 200}) {
+    const BodyOptions options{.nodes = wanted};
+    const double best = misfit(200, 1, cube, options);
+    EXPECT_NEAR(best, 0, 1e-15);
+    EXPECT_GT(misfit(200, 0.7, cube, options), best);
+    EXPECT_GT(misfit(200, 1, slab, options), best);
+    EXPECT_GT(misfit(150, 1, cube, options), best);
+    EXPECT_GT(misfit(300, 1, cube, options), best);
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

@@ -19,6 +19,11 @@ struct CaseName {
 using Cases =
     testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>>;
 
+/// Whether the method's own loss of angular momentum is within angular_tolerance.
+inline bool keeps_angular_momentum(Method method) { return method == Method::kExplicit; }
+/// [m2/s] of a body about a metre long, per kg and step.
+inline double angular_tolerance(Method) { return 1e-12; }
+
 /// Steps a scene with one method and gives each step to `look(before, after, impulses)`.
 template <int Dim, typename Look>
 StateOf<Dim> simulate(Method method, const SceneOf<Dim>& scene, StateOf<Dim> state, double dt, int steps, const Look& look) {

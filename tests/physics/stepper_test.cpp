@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstring>
 
-#include "tests/physics/method_cases.h"
+#include "tests/physics/element_method_scene.h"
 
 namespace {
 std::atomic<long> allocations = 0;  // of this program: Eigen's by malloc and the library's by new, which the linker wraps
@@ -285,6 +285,21 @@ TYPED_TEST(Steppers, AllocateNothingInTheStepLoop) {
   stepper->step(kDt, activation, &push, state, impulses);
   const long before = allocations;
   for (int k = 0; k < 48; ++k) stepper->step(kDt, activation, &push, state, impulses);
+  EXPECT_EQ(allocations - before, 0);
+}
+
+TYPED_TEST(Steppers, AllocateNothingInTheStepLoopOfElements) {
+  constexpr int Dim = TypeParam::kDim;
+  SceneOf<Dim> scene = scene_of(random_element_body<Dim>(5, Cut::kBoxes, ElasticLaw::kStableNeoHookean), {});
+  touch_with_whole_surface(scene);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  StateOf<Dim> state = laid_down(scene, 0.01);
+  std::mt19937 random(1);
+  const Eigen::VectorXd activations[2] = {random_activation(random, scene.body, 0.1), random_activation(random, scene.body, 0.1)};
+  stepper->step(kDt, activations[1], nullptr, state, impulses);
+  const long before = allocations;
+  for (int k = 0; k < 48; ++k) stepper->step(kDt, activations[k % 2], nullptr, state, impulses);
   EXPECT_EQ(allocations - before, 0);
 }
 

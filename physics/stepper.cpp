@@ -8,6 +8,8 @@ std::string name_of(Method method) {
       return "explicit";
     case Method::kEuler:
       return "euler";
+    case Method::kImplicit:
+      return "implicit";
   }
   return {};
 }
@@ -19,6 +21,8 @@ std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& 
       return make_explicit_stepper(scene);
     case Method::kEuler:
       return make_euler_stepper(scene);
+    case Method::kImplicit:
+      return make_implicit_stepper(scene);
   }
   return nullptr;
 }

@@ -23,7 +23,7 @@ class StepperOf {
 };
 using Stepper = StepperOf<3>;
 
-enum class Method { kExplicit, kEuler };
+enum class Method { kExplicit, kEuler, kImplicit };
 std::string name_of(Method method);
 /// Throws nothing; every scene is accepted. The scene must outlive the stepper.
 template <int Dim>
@@ -33,5 +33,7 @@ template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene);
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_euler_stepper(const SceneOf<Dim>& scene);
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_implicit_stepper(const SceneOf<Dim>& scene);
 
 }  // namespace hydrostat::physics

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include "physics/element_body.h"
 #include "tests/physics/element_scene.h"
 #include "tests/physics/method_cases.h"

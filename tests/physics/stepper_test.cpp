@@ -125,8 +125,8 @@ TYPED_TEST(Steppers, BalanceMomentumWithTheBookedImpulsesInContact) {
       },
       0.1);
   EXPECT_LT(worst, 1e-6);
-  EXPECT_LT(worst_moment,
-            TypeParam::kMethod == Method::kExplicit ? 1e-9 : 1.0);  // mg L: backward Euler's own loss at touchdown
+  // mg L; the last is backward Euler's own loss at touchdown.
+  EXPECT_LT(worst_moment, TypeParam::kMethod == Method::kExplicit ? 1e-9 : TypeParam::kMethod == Method::kImplicit ? 1e-4 : 1.0);
 }
 
 TYPED_TEST(Steppers, BookDeclaredEffectsAndNothingElse) {
@@ -147,9 +147,7 @@ TYPED_TEST(Steppers, BookDeclaredEffectsAndNothingElse) {
     EXPECT_LT((change - kDt * (push.rowwise().sum() + body.mass.sum() * scene.gravity)).norm(), 1e-12);
     const SpinOf<Dim> turned = angular_momentum(body, state.x, state.v, VectorOf<Dim>::Zero()) -
                                angular_momentum(body, before.x, before.v, VectorOf<Dim>::Zero());
-    if (TypeParam::kMethod == Method::kExplicit) {
-      EXPECT_LT((turned - impulses.effect_moment - impulses.gravity_moment).norm(), 1e-12);
-    }
+    EXPECT_LT((turned - impulses.effect_moment - impulses.gravity_moment).norm(), angular_tolerance(TypeParam::kMethod));
   }
 }
 

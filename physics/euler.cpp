@@ -51,6 +51,8 @@ class EulerStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt; }
 
+  void forget() override { contact_.forget(); }
+
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     const BodyOf<Dim>& body = scene_.body;

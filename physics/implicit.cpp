@@ -68,6 +68,8 @@ class ImplicitStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt; }
 
+  void forget() override { contact_.forget(); }
+
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     if (!forces_.set_activation(activation)) return Termination::kDiverged;

@@ -18,11 +18,11 @@ template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene) {
   switch (method) {
     case Method::kExplicit:
-      return make_explicit_stepper(scene);
+      return make_guarded_stepper(scene, make_explicit_stepper(scene));
     case Method::kEuler:
       return make_euler_stepper(scene);
     case Method::kImplicit:
-      return make_implicit_stepper(scene);
+      return make_guarded_stepper(scene, make_implicit_stepper(scene));
   }
   return nullptr;
 }

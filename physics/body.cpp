@@ -62,6 +62,13 @@ BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 
 }
 
 template <int Dim>
+Eigen::VectorXd inverse_masses(const BodyOf<Dim>& body) {
+  Eigen::VectorXd inverse = body.mass.cwiseInverse();
+  for (const int node : body.held) inverse[node] = 0;
+  return inverse;
+}
+
+template <int Dim>
 VectorOf<Dim> centre_of_mass(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x) {
   return x * body.mass / body.mass.sum();
 }
@@ -115,6 +122,7 @@ Eigen::VectorXd jacobians(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x) 
   template BodyOf<Dim> make_body<Dim>(const Eigen::Matrix<double, Dim, Eigen::Dynamic>&,                               \
                                       const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>&, const Eigen::Matrix2Xi&,     \
                                       const Eigen::VectorXd&, const Material&);                                        \
+  template Eigen::VectorXd inverse_masses<Dim>(const BodyOf<Dim>&);                                                    \
   template VectorOf<Dim> centre_of_mass<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);                           \
   template VectorOf<Dim> momentum<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);                                 \
   template SpinOf<Dim> angular_momentum<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const ConstPointsOf<Dim>&, \

@@ -1,11 +1,22 @@
 #pragma once
 
+#include <vector>
+
 #include "physics/dimension.h"
+#include "physics/element_activation.h"
 
 namespace hydrostat::physics {
 
-/// A soft body: springs along the edges of a tetrahedral mesh, whose rest lengths are commanded, and volume per tet.
-/// In 2D a tet is a triangle, its volume the area times one metre of depth.
+/// Finite elements of one shape and one law in a body, strained by the activations of its edges.
+template <int Dim>
+struct BodyElements {
+  ElementBlock<Dim> block;
+  ActivationFit<Dim> fit;  // of_element names edges of the body: every pair of nodes of an element must be one
+};
+
+/// A soft body: springs along the edges of a tetrahedral mesh, whose rest lengths are commanded, and volume per tet; beside
+/// them or in their stead finite elements. The tets fill the body whatever bears its stress: its volume, inversion and
+/// surface are read from them. In 2D a tet is a triangle, its volume the area times one metre of depth.
 template <int Dim>
 struct BodyOf {
   PointsOf<Dim> rest;                                               // rest positions [m] Dim x N
@@ -17,7 +28,9 @@ struct BodyOf {
   Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> tets;                 // Dim + 1 x T, positive volume at rest
   Eigen::Matrix<int, kEdgesPerTet<Dim>, Eigen::Dynamic> tet_edges;  // x T: the edges 01 02 03 12 13 23 (01 02 12) of the tet
   Eigen::VectorXd rest_volume;                                      // [m3] T, of the whole tet
-  Eigen::VectorXd volume_stiffness;                                 // [J] T: kappa times the filled volume
+  Eigen::VectorXd volume_stiffness;                                 // [J] T: kappa times the filled volume; or empty: none
+  std::vector<BodyElements<Dim>> elements = {};
+  std::vector<int> held = {};  // nodes that stay where they start, each once; what holds them is booked
 
   int node_count() const { return static_cast<int>(mass.size()); }
   int edge_count() const { return static_cast<int>(rest_length.size()); }
@@ -39,6 +52,10 @@ struct Material {
 template <int Dim>
 BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>& tets,
                       const Eigen::Matrix2Xi& edges, const Eigen::VectorXd& fill, const Material& material);
+
+/// 1 / mass of every node [1/kg], 0 of those that are held; N.
+template <int Dim>
+Eigen::VectorXd inverse_masses(const BodyOf<Dim>& body);
 
 template <int Dim>
 struct StateOf {

@@ -21,7 +21,7 @@ template <int Dim>
 ContactSet<Dim>::ContactSet(const SceneOf<Dim>& scene) : scene_(scene), first_obstacle_(scene.has_ground ? 1 : 0) {
   const ContactPointsOf<Dim>& points = scene.contact_points;
   if (points.count() == 0 || (!scene.has_ground && scene.obstacles.empty())) return;
-  inverse_mass_ = scene.body.mass.cwiseInverse();
+  inverse_mass_ = inverse_masses(scene.body);
   for (int p = 0; p < points.count(); ++p) features_.push_back({1, {p}});
   const bool seeks_between =
       std::any_of(scene.obstacles.begin(), scene.obstacles.end(),

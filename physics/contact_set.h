@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -19,7 +20,7 @@ struct ContactOf {
   std::array<double, kMostNodes> weights;
   std::array<int, Dim> points;     // contact points that share what it bears
   std::array<double, Dim> shares;  // sum 1
-  double inverse_mass;             // [1/kg] that an impulse meets
+  double inverse_mass;             // [1/kg] that an impulse meets; 0 where all nodes are held
   VectorOf<Dim> normal;            // away from the surface
   double gap;                      // [m], negative inside; infinite where nothing stands opposite
 
@@ -32,6 +33,22 @@ struct ContactOf {
     return sum;
   }
 };
+
+/// The impulse [N s] that a place moving at `velocity` [m/s] against its surface needs in all, `impulse` being in its velocity
+/// already: none slower than least_velocity along the normal, none along the surface, inside Coulomb's cone.
+template <int Dim>
+VectorOf<Dim> impulse_in_cone(const ContactOf<Dim>& contact, const VectorOf<Dim>& velocity, double least_velocity,
+                              double friction, const VectorOf<Dim>& impulse) {
+  const VectorOf<Dim>& normal = contact.normal;
+  const double normal_velocity = normal.dot(velocity);
+  const double normal_impulse =
+      std::max(0.0, normal.dot(impulse) + (least_velocity - normal_velocity) / contact.inverse_mass);
+  VectorOf<Dim> tangential =
+      impulse - normal.dot(impulse) * normal - (velocity - normal_velocity * normal) / contact.inverse_mass;
+  const double limit = friction * normal_impulse, size = tangential.norm();
+  if (size > limit) tangential *= limit / size;
+  return normal_impulse * normal + tangential;
+}
 
 /// Finds where the body may touch ground and obstacles. Contact points are tested against every surface. What has corners
 /// or is round is also felt between them: along the edges of the contact faces the deepest place is sought, and corners and
@@ -80,7 +97,7 @@ class ContactSet {
   std::vector<int> slot_begin_;          // of each surface
   std::vector<int> feature_count_;       // of each surface
   std::vector<CornersOf<Dim>> corners_;  // of each surface
-  Eigen::VectorXd inverse_mass_;         // [1/kg] of the nodes
+  Eigen::VectorXd inverse_mass_;         // [1/kg] of the nodes, 0 of held ones
   std::vector<ContactOf<Dim>> candidates_, point_contacts_;
 };
 

@@ -5,7 +5,7 @@ namespace {
 
 template <int Dim>
 void add_volume_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, PointsOf<Dim>& force) {
-  for (int t = 0; t < body.tet_count(); ++t) {
+  for (int t = 0; t < body.volume_stiffness.size(); ++t) {
     double jacobian;
     const Eigen::Matrix<double, Dim, Dim + 1> gradient =
         jacobian_gradient<Dim>(x, body.tets, t, body.rest_volume[t], jacobian);
@@ -23,7 +23,7 @@ double elastic_energy(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, cons
     const double stretch = (x.col(body.edges(1, e)) - x.col(body.edges(0, e))).norm() - activation[e] * body.rest_length[e];
     energy += 0.5 * body.edge_stiffness[e] * stretch * stretch;
   }
-  for (int t = 0; t < body.tet_count(); ++t) {
+  for (int t = 0; t < body.volume_stiffness.size(); ++t) {
     double jacobian;
     jacobian_gradient<Dim>(x, body.tets, t, body.rest_volume[t], jacobian);
     energy += 0.5 * body.volume_stiffness[t] * (jacobian - 1) * (jacobian - 1);

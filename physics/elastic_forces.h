@@ -4,6 +4,8 @@
 
 namespace hydrostat::physics {
 
+// What edges and tets do; a body's finite elements come to it in InternalForces.
+
 /// Elastic energy [J]: sum over edges of k/2 (l - a l0)^2 and over tets of kappa V/2 (J - 1)^2; a is the activation, E.
 template <int Dim>
 double elastic_energy(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const Eigen::VectorXd& activation);

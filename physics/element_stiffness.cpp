@@ -28,6 +28,50 @@ ElementMatrix stiffness_of(const ElementVariation<Dim, Nodes>& variation, Defini
   return result;
 }
 
+constexpr double kSlack = 1.5;  // the bound is less tight at rest than where it grows
+
+/// Bound on the second derivative of the law at F: what |F| and its cofactor add to shear and pressure.
+template <int Dim>
+double stiffness_bound(ElasticLaw law, const Lame& lame, const SquareMatrix<double, Dim>& F) {
+  if (law == ElasticLaw::kCorotatedLinear) {  // grows where much is stretched and two sides are not
+    const double stretch = std::sqrt(F.squaredNorm() / Dim);
+    return 2 * lame.mu + Dim * lame.lambda * std::max(1.0, stretch);
+  }
+  const StableNeoHookean<double> flesh(lame.lambda, lame.mu);
+  const SquareMatrix<double, Dim> slope = cofactor(F);
+  const double squared = F.squaredNorm(), invariant = squared + 4 - Dim;
+  return flesh.mu * (1 - 1 / invariant + 2 * squared / (invariant * invariant)) + flesh.lambda * slope.squaredNorm() +
+         std::abs(flesh.pressure(determinant(F, slope))) * (Dim == 3 ? std::sqrt(squared) : 1);
+}
+
+template <int Dim, int Nodes>
+double stiffening_of(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active) {
+  using Kernel = ElementKernel<double, Dim, Nodes>;
+  using Layout = ElementLayout<Dim, Nodes>;
+  double growth = 1;
+  for (int e = 0; e < block.element_count(); ++e) {
+    const ElementData<double> data(block.lanes, e, Layout::kSize);
+    SquareMatrix<double, Dim> F = SquareMatrix<double, Dim>::Zero();
+    for (int n = 1; n < Nodes; ++n) {
+      const Eigen::Matrix<double, Dim, 1> offset = x.col(block.nodes(n, e)) - x.col(block.nodes(0, e));
+      for (int j = 0; j < Dim; ++j) F.col(j) += data[Layout::kGradient + Dim * (n - 1) + j] * offset;
+    }
+    double of_gradients = 1;
+    if (active) {
+      const SquareMatrix<double, Dim> inverse =
+          Kernel::active_inverse(ElementData<double>(active->lanes, e, ActiveLayout<Dim, Nodes>::kSize));
+      F = (F * inverse).eval();
+      const double longest = inverse.cwiseAbs().rowwise().sum().maxCoeff();  // no eigenvalue is larger
+      of_gradients = std::max(1.0, longest * longest);
+    }
+    const Lame lame{data[Layout::kLambda], data[Layout::kMu]};
+    const SquareMatrix<double, Dim> rest = SquareMatrix<double, Dim>::Identity();
+    const double ratio = stiffness_bound<Dim>(block.law, lame, F) / stiffness_bound<Dim>(block.law, lame, rest);
+    growth = std::max(growth, of_gradients * (1 + kSlack * (ratio - 1)));
+  }
+  return growth;
+}
+
 template <int Dim>
 double determinant_of_edges(const NodeMatrix<Dim>& corners, int corner, bool is_box) {
   SquareMatrix<double, Dim> edges;
@@ -64,6 +108,11 @@ double highest_frequency(const ElementBlock<Dim>& block, const ConstNodeMatrix<D
 }
 
 template <int Dim>
+double element_stiffening(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active) {
+  return block.is_box() ? stiffening_of<Dim, 1 << Dim>(block, x, active) : stiffening_of<Dim, Dim + 1>(block, x, active);
+}
+
+template <int Dim>
 Eigen::VectorXd least_jacobians(const ElementBlock<Dim>& block, const ElementMesh<Dim>& mesh, const ConstNodeMatrix<Dim>& x) {
   Eigen::VectorXd least(block.element_count());
   NodeMatrix<Dim> now(Dim, block.nodes_per_element());
@@ -85,6 +134,8 @@ template ElementMatrix element_stiffness<3>(const ElementBlock<3>&, int, const C
                                             Definiteness);
 template double highest_frequency<2>(const ElementBlock<2>&, const ConstNodeMatrix<2>&, const ActiveStrain<2>*);
 template double highest_frequency<3>(const ElementBlock<3>&, const ConstNodeMatrix<3>&, const ActiveStrain<3>*);
+template double element_stiffening<2>(const ElementBlock<2>&, const ConstNodeMatrix<2>&, const ActiveStrain<2>*);
+template double element_stiffening<3>(const ElementBlock<3>&, const ConstNodeMatrix<3>&, const ActiveStrain<3>*);
 template Eigen::VectorXd least_jacobians<2>(const ElementBlock<2>&, const ElementMesh<2>&, const ConstNodeMatrix<2>&);
 template Eigen::VectorXd least_jacobians<3>(const ElementBlock<3>&, const ElementMesh<3>&, const ConstNodeMatrix<3>&);
 

@@ -21,6 +21,11 @@ ElementMatrix element_stiffness(const ElementBlock<Dim>& block, int element, con
 template <int Dim>
 double highest_frequency(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active);
 
+/// By how much the stiffest element is stiffer at x than at rest [-], >= 1: from a bound on the second derivative of the law at
+/// the mean deformation, over the same bound at rest. Dear as a sweep over the forces, so that a step can afford it.
+template <int Dim>
+double element_stiffening(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active);
+
 /// Least det F [-] of each element: of a box, the least over its corners; E.
 template <int Dim>
 Eigen::VectorXd least_jacobians(const ElementBlock<Dim>& block, const ElementMesh<Dim>& mesh, const ConstNodeMatrix<Dim>& x);

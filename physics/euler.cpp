@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "physics/elastic_forces.h"
+#include "physics/internal_forces.h"
 #include "physics/penalty_contact.h"
 #include "physics/stepper.h"
 
@@ -36,6 +37,7 @@ class EulerStepper final : public StepperOf<Dim> {
  public:
   explicit EulerStepper(const SceneOf<Dim>& scene)
       : scene_(scene),
+        forces_(scene.body),
         matrix_(scene.body),
         contact_(scene),
         size_(size_of_volume<Dim>(scene.body.rest_volume.sum())),
@@ -49,43 +51,48 @@ class EulerStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt; }
 
+  void forget() override { contact_.forget(); }
+
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     const BodyOf<Dim>& body = scene_.body;
+    if (!forces_.set_activation(activation)) return Termination::kDiverged;
     start_ = state;
+    for (const int node : body.held) state.v.col(node).setZero();
     foreseen_ = state.x + dt * state.v;
     for (int i = 0; i < body.node_count(); ++i) {
       foreseen_.col(i) += dt * dt * scene_.gravity;
       if (effect_force != nullptr) foreseen_.col(i) += (dt * dt / body.mass[i]) * effect_force->col(i);
     }
+    for (const int node : body.held) foreseen_.col(node) = state.x.col(node);
     // The search starts where the body would be without forces between its nodes, unless that is a worse place than here.
     trial_ = state.x + dt * state.v;
     if (contact_.is_needed()) {
       contact_.begin(start_, foreseen_, dt, reach(dt));
       contact_.update_friction(state.x);
     }
-    state.x = potential(trial_, dt, activation) < potential(state.x, dt, activation) ? trial_ : state.x;
-    find_residual(state.x, dt, activation);
+    state.x = potential(trial_, dt) < potential(state.x, dt) ? trial_ : state.x;
+    find_residual(state.x, dt);
     double enough = kResidual * size_, part = 1, last = std::numeric_limits<double>::infinity();
     for (int k = 0, updates = 0; k < kNewtonSteps; ++k) {
       if (residual_speed(dt) <= enough) {
         if (!contact_.is_needed()) break;
         contact_.update_friction(state.x);
-        find_residual(state.x, dt, activation);
+        find_residual(state.x, dt);
         if (residual_speed(dt) <= kResidual * size_) break;
         if (++updates > kFreeUpdates) {
           if (residual_speed(dt) > kShorterUpdate * last) part *= kShorterUpdate;
           last = residual_speed(dt);
           contact_.shorten_friction_update(part);
-          find_residual(state.x, dt, activation);
+          find_residual(state.x, dt);
         }
         enough = std::max(kResidual * size_, kInnerDecrease * residual_speed(dt));
       }
-      if (!move_downhill(dt, activation, state.x)) break;
-      find_residual(state.x, dt, activation);
+      if (!move_downhill(dt, state.x)) break;
+      find_residual(state.x, dt);
     }
     if (contact_.is_needed()) contact_.update_friction(state.x);
-    find_residual(state.x, dt, activation);
+    find_residual(state.x, dt);
     book(dt, effect_force, state, impulses);
     if (!state.v.allFinite() || !(residual_speed(dt) <= kGivenUp * size_)) {
       state = start_;
@@ -106,9 +113,9 @@ class EulerStepper final : public StepperOf<Dim> {
   }
 
   /// What the step minimises [J].
-  double potential(const PointsOf<Dim>& x, double dt, const Eigen::VectorXd& activation) const {
+  double potential(const PointsOf<Dim>& x, double dt) const {
     const BodyOf<Dim>& body = scene_.body;
-    double sum = elastic_energy(body, x, activation);
+    double sum = forces_.elastic_energy(x);
     for (int i = 0; i < body.node_count(); ++i) {
       sum += 0.5 * body.mass[i] * (x.col(i) - foreseen_.col(i)).squaredNorm() / (dt * dt);
     }
@@ -124,16 +131,17 @@ class EulerStepper final : public StepperOf<Dim> {
   }
 
   /// Fills force_ and residual_, the gradient of the potential [N].
-  void find_residual(const PointsOf<Dim>& x, double dt, const Eigen::VectorXd& activation) {
+  void find_residual(const PointsOf<Dim>& x, double dt) {
     const BodyOf<Dim>& body = scene_.body;
     force_.setZero();
-    add_elastic_forces(body, x, activation, force_);
+    forces_.add_elastic_forces(x, force_);
     moved_ = (x - start_.x) / dt;
     add_damping_forces(body, start_.x, moved_, force_);
     if (contact_.is_needed()) contact_.add_forces(x, force_);
     for (int i = 0; i < body.node_count(); ++i) {
       residual_.col(i) = (body.mass[i] / (dt * dt)) * (x.col(i) - foreseen_.col(i)) - force_.col(i);
     }
+    for (const int node : body.held) residual_.col(node).setZero();
   }
 
   double residual_speed(double dt) const {
@@ -146,22 +154,24 @@ class EulerStepper final : public StepperOf<Dim> {
   }
 
   /// One Newton step with line search. False: the potential cannot be lowered along it.
-  bool move_downhill(double dt, const Eigen::VectorXd& activation, PointsOf<Dim>& x) {
+  bool move_downhill(double dt, PointsOf<Dim>& x) {
     const BodyOf<Dim>& body = scene_.body;
     matrix_.set_zero();
     matrix_.add_mass(body, 1 / (dt * dt));
-    matrix_.add_stiffness(body, x, activation, 1);
+    forces_.add_stiffness(x, 1, matrix_);
     matrix_.add_damping(body, start_.x, 1 / dt);
     if (contact_.is_needed()) contact_.add_stiffness(x, 1, matrix_);
+    matrix_.hold(body.held);
     if (!matrix_.factor()) return false;
     direction_ = -residual_.reshaped();
     matrix_.solve_in_place(direction_);
-    const double here = potential(x, dt, activation), slope = residual_.reshaped().dot(direction_);
+    for (const int node : body.held) direction_.template segment<Dim>(Dim * node).setZero();
+    const double here = potential(x, dt), slope = residual_.reshaped().dot(direction_);
     if (!(slope < 0)) return false;
     double part = 1;
     for (int k = 0; k < kHalvings; ++k, part /= 2) {
       trial_ = x + part * direction_.reshaped(Dim, body.node_count());
-      if (potential(trial_, dt, activation) <= here + kArmijo * part * slope + kRounding * std::abs(here)) {
+      if (potential(trial_, dt) <= here + kArmijo * part * slope + kRounding * std::abs(here)) {
         x.swap(trial_);
         return true;
       }
@@ -182,9 +192,15 @@ class EulerStepper final : public StepperOf<Dim> {
     impulses.gravity_moment = dt * cross<Dim>(state.x * body.mass, scene_.gravity);
     state.v = start_.v + impulses.effect_nodes * body.mass.cwiseInverse().asDiagonal();
     for (int i = 0; i < body.node_count(); ++i) state.v.col(i) += dt * (force_.col(i) / body.mass[i] + scene_.gravity);
+    for (std::size_t n = 0; n < body.held.size(); ++n) {
+      const int node = body.held[n];
+      impulses.hold.col(static_cast<Eigen::Index>(n)) = -body.mass[node] * state.v.col(node);
+      state.v.col(node).setZero();
+    }
   }
 
   const SceneOf<Dim>& scene_;
+  InternalForces<Dim> forces_;
   SystemMatrixOf<Dim> matrix_;
   PenaltyContact<Dim> contact_;
   double size_;             // [m]

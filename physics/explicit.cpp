@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "physics/elastic_forces.h"
 #include "physics/impulse_contact.h"
+#include "physics/internal_forces.h"
 #include "physics/stepper.h"
-#include "physics/system_matrix.h"
 
 namespace hydrostat::physics {
 namespace {
@@ -25,10 +24,10 @@ double longest_substep(const StiffestMode& mode) {
 /// the roots of the amplification polynomial stay in the unit disc. The dashpots act along edges alone, the stiffest modes
 /// are those of volume: with D itself the bound is several times longer than with D = (largest damping time) K.
 template <int Dim>
-StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body) {
+StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body, const InternalForces<Dim>& forces) {
   SystemMatrixOf<Dim> stiffness(body), damping(body);
   stiffness.set_zero();
-  stiffness.add_stiffness(body, body.rest, Eigen::VectorXd::Ones(body.edge_count()), 1);
+  forces.add_stiffness(body.rest, 1, stiffness);
   damping.set_zero();
   damping.add_damping(body, body.rest, 1);
   Eigen::VectorXd root_mass(Dim * body.node_count());
@@ -49,22 +48,6 @@ StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body) {
   return mode;
 }
 
-/// Largest of the tets' own frequencies squared [1/s2] by their volume springs: these stiffen with the square of the area of
-/// their faces.
-template <int Dim>
-double stiffest_volume(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass) {
-  double largest = 0;
-  for (int t = 0; t < body.tet_count(); ++t) {
-    double jacobian;
-    const Eigen::Matrix<double, Dim, Dim + 1> gradient =
-        jacobian_gradient<Dim>(x, body.tets, t, body.rest_volume[t], jacobian);
-    double sum = 0;
-    for (int k = 0; k <= Dim; ++k) sum += gradient.col(k).squaredNorm() * inverse_mass[body.tets(k, t)];
-    largest = std::max(largest, body.volume_stiffness[t] * sum);
-  }
-  return largest;
-}
-
 /// Symplectic Euler (velocity Verlet with velocities at half steps) with contact by impulses.
 ///
 /// Internal forces are pairwise and taken at the positions from which the step starts, so linear and angular momentum
@@ -74,9 +57,12 @@ template <int Dim>
 class ExplicitStepper final : public StepperOf<Dim> {
  public:
   explicit ExplicitStepper(const SceneOf<Dim>& scene)
-      : scene_(scene), force_(Dim, scene.body.node_count()), inverse_mass_(scene.body.mass.cwiseInverse()), contact_(scene) {
-    mode_at_rest_ = stiffest_mode_at_rest(scene.body);
-    stiffest_volume_at_rest_ = stiffest_volume<Dim>(scene.body, scene.body.rest, inverse_mass_);
+      : scene_(scene),
+        forces_(scene.body),
+        force_(Dim, scene.body.node_count()),
+        inverse_mass_(scene.body.mass.cwiseInverse()),
+        contact_(scene) {
+    mode_at_rest_ = stiffest_mode_at_rest(scene.body, forces_);
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
 
@@ -84,10 +70,11 @@ class ExplicitStepper final : public StepperOf<Dim> {
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
+    if (!forces_.set_activation(activation)) return Termination::kDiverged;
     start_ = state;
     // The bound at rest, shortened by as much as the shape from which the step starts is stiffer.
     StiffestMode mode = mode_at_rest_;
-    mode.frequency_squared *= std::max(1.0, stiffest_volume(scene_.body, state.x, inverse_mass_) / stiffest_volume_at_rest_);
+    mode.frequency_squared *= forces_.stiffening(state.x);
     const double count = std::ceil(dt / (kStepMargin * longest_substep(mode)));
     if (!(count <= kMostSubsteps)) return Termination::kDiverged;
     const int substeps = static_cast<int>(count);
@@ -96,7 +83,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
     contact_.forget_reach();
     for (int s = 0; s < substeps; ++s) {
       force_.setZero();
-      add_internal_forces(scene_.body, state, activation, force_);
+      forces_.add_forces(state, force_);
       if (effect_force != nullptr) {
         force_ += *effect_force;
         impulses.effect_nodes += h * *effect_force;
@@ -104,6 +91,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
           impulses.effect_moment += h * cross<Dim>(state.x.col(i), effect_force->col(i));
         }
       }
+      hold(h, state, impulses);
       double fastest = 0;
       for (int i = 0; i < scene_.body.node_count(); ++i) {
         state.v.col(i) += h * (inverse_mass_[i] * force_.col(i) + scene_.gravity);
@@ -119,18 +107,31 @@ class ExplicitStepper final : public StepperOf<Dim> {
       if (contact_.is_needed()) contact_.push_apart(h, std::sqrt(fastest), state, impulses);
       state.x += h * state.v;
     }
+    for (std::size_t n = 0; n < scene_.body.held.size(); ++n) {
+      impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.contact_nodes.col(scene_.body.held[n]);
+    }
     return Termination::kDone;
   }
 
  private:
+  /// Turns the force on held nodes into the one that stops them, and books what that takes.
+  void hold(double h, const StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
+    for (std::size_t n = 0; n < scene_.body.held.size(); ++n) {
+      const int node = scene_.body.held[n];
+      const VectorOf<Dim> balanced = -scene_.body.mass[node] * (scene_.gravity + state.v.col(node) / h);
+      impulses.hold.col(static_cast<Eigen::Index>(n)) += h * (balanced - force_.col(node));
+      force_.col(node) = balanced;
+    }
+  }
+
   const SceneOf<Dim>& scene_;
+  InternalForces<Dim> forces_;
   PointsOf<Dim> force_;  // [N]
   Eigen::VectorXd inverse_mass_;
   ImpulseContact<Dim> contact_;
   StateOf<Dim> start_;
-  StiffestMode mode_at_rest_{};         // of the body at rest
-  double stiffest_volume_at_rest_ = 0;  // [1/s2]
-  double shortest_edge_ = 0;            // [m]
+  StiffestMode mode_at_rest_{};  // of the body at rest
+  double shortest_edge_ = 0;     // [m]
 };
 
 }  // namespace

@@ -14,7 +14,7 @@ constexpr double kTolerance = 1e-7;  // [m/s] change of a place's velocity in a 
 
 template <int Dim>
 ImpulseContact<Dim>::ImpulseContact(const SceneOf<Dim>& scene)
-    : set_(scene), inverse_mass_(scene.body.mass.cwiseInverse()), impulse_(PointsOf<Dim>::Zero(Dim, set_.slot_count())) {
+    : set_(scene), inverse_mass_(inverse_masses(scene.body)), impulse_(PointsOf<Dim>::Zero(Dim, set_.slot_count())) {
   shortest_edge_ = scene.body.rest_length.minCoeff();
   push_out_speed_ = push_out_speed(scene);
   active_.reserve(static_cast<std::size_t>(set_.slot_count()));
@@ -47,7 +47,7 @@ void ImpulseContact<Dim>::gather_active(double h, StateOf<Dim>& state) {
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     ContactOf<Dim>& contact = candidates[c];
     set_.update(state.x, state.obstacle_travel, contact);
-    if (!std::isfinite(contact.gap)) {
+    if (!std::isfinite(contact.gap) || contact.inverse_mass == 0) {
       impulse_.col(contact.slot).setZero();
       continue;
     }
@@ -66,16 +66,8 @@ double ImpulseContact<Dim>::sweep(StateOf<Dim>& state) {
   for (const Active& active : active_) {
     const ContactOf<Dim>& contact = set_.candidates()[static_cast<std::size_t>(active.candidate)];
     const VectorOf<Dim> velocity = contact.of(state.v) - set_.velocity(contact);
-    const VectorOf<Dim>& normal = contact.normal;
-    VectorOf<Dim> wanted = impulse_.col(contact.slot);
-    const double normal_velocity = normal.dot(velocity);
-    const double normal_impulse =
-        std::max(0.0, normal.dot(wanted) + (active.least_velocity - normal_velocity) / contact.inverse_mass);
-    VectorOf<Dim> tangential =
-        wanted - normal.dot(wanted) * normal - (velocity - normal_velocity * normal) / contact.inverse_mass;
-    const double limit = set_.friction(contact) * normal_impulse, size = tangential.norm();
-    if (size > limit) tangential *= limit / size;
-    wanted = normal_impulse * normal + tangential;
+    const VectorOf<Dim> wanted = impulse_in_cone<Dim>(contact, velocity, active.least_velocity, set_.friction(contact),
+                                                      impulse_.col(contact.slot));
     const VectorOf<Dim> step = wanted - impulse_.col(contact.slot);
     change = std::max(change, step.norm() * contact.inverse_mass);
     impulse_.col(contact.slot) = wanted;

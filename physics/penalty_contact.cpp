@@ -7,6 +7,8 @@ namespace hydrostat::physics {
 namespace {
 
 constexpr double kSinkage = 0.0005;          // of the body's size [-]: how deep one place sinks that bears the whole weight
+constexpr int kSweeps = 30;
+constexpr double kTolerance = 1e-8;          // [m/s] change of a place's velocity in a sweep
 constexpr double kWeightOfNoGravity = 9.81;  // [m/s2] takes gravity's place in the contact stiffness where there is none
 
 }  // namespace
@@ -21,6 +23,11 @@ PenaltyContact<Dim>::PenaltyContact(const SceneOf<Dim>& scene)
   stiffness_ = scene.body.mass.sum() * (gravity > 0 ? gravity : kWeightOfNoGravity) / (kSinkage * size);
   push_out_speed_ = push_out_speed(scene);
   touches_.reserve(static_cast<std::size_t>(set_.slot_count()));
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::forget() {
+  std::fill(touching_.begin(), touching_.end(), 0);
 }
 
 template <int Dim>
@@ -156,7 +163,34 @@ void PenaltyContact<Dim>::book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim
       impulses.contact_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
     }
     impulses.contact_moment += cross<Dim>(place, impulse);
-    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + (touch.lift / dt) * contact.normal);
+    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + (touch.lift / dt_) * contact.normal);
+  }
+}
+
+template <int Dim>
+void PenaltyContact<Dim>::stop_approach(const PointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass, PointsOf<Dim>& v) {
+  VectorOf<Dim> normal;
+  for (Touch& touch : touches_) {
+    touch.force.setZero();  // impulses from here on
+    touch.stops = depth(touch, x, normal) > 0 && touch.contact.inverse_mass > 0;
+    if (touch.stops) touch.contact.normal = normal;
+  }
+  for (int k = 0; k < kSweeps; ++k) {
+    double change = 0;
+    for (Touch& touch : touches_) {
+      if (!touch.stops) continue;
+      const ContactOf<Dim>& contact = touch.contact;
+      const VectorOf<Dim> velocity = contact.of(v) - set_.velocity(contact);
+      const VectorOf<Dim> wanted = impulse_in_cone<Dim>(contact, velocity, 0, set_.friction(contact), touch.force);
+      const VectorOf<Dim> step = wanted - touch.force;
+      change = std::max(change, step.norm() * contact.inverse_mass);
+      touch.force = wanted;
+      for (int n = 0; n < contact.node_count; ++n) {
+        const auto node = static_cast<std::size_t>(n);
+        v.col(contact.nodes[node]) += (contact.weights[node] * inverse_mass[contact.nodes[node]]) * step;
+      }
+    }
+    if (change < kTolerance) break;
   }
 }
 

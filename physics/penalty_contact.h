@@ -15,6 +15,8 @@ class PenaltyContact {
   explicit PenaltyContact(const SceneOf<Dim>& scene);
 
   bool is_needed() const { return !set_.is_empty(); }
+  /// To be called when the state is not the one that the last step left behind.
+  void forget();
   /// Finds what may touch within `reach` [m] of the start and lays the anchors; `foreseen` is about where the step ends.
   void begin(const StateOf<Dim>& start, const PointsOf<Dim>& foreseen, double dt, double reach);
   /// Takes the friction limits and their directions from `x`.
@@ -24,6 +26,9 @@ class PenaltyContact {
   double potential(const PointsOf<Dim>& x) const;                 // [J]
   void add_forces(const PointsOf<Dim>& x, PointsOf<Dim>& force);  // [N]; keeps them for book
   void add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) const;
+  /// Takes from the velocities of touching places what approaches and, inside Coulomb's cone, slides: what book then books
+  /// with a dt of 1 are the impulses of that.
+  void stop_approach(const PointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass, PointsOf<Dim>& v);
   /// Books the forces of the last add_forces, as acting for dt at the places of `x`.
   void book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim>& impulses) const;
   /// The step is done: drags the anchors, moves the obstacles.
@@ -36,6 +41,7 @@ class PenaltyContact {
     double limit = 0, last_limit = 0;  // [N] of friction
     double depth_at_rest = 0;          // [m] below the surface where the normal spring ends
     double lift = 0;                   // [m] by which that has moved up in this step
+    bool stops = false;                // touches at the end of the step
     double plane_offset = 0;           // of a contact between the points: its surface is held to be a plane
   };
   double depth(const Touch& touch, const PointsOf<Dim>& x, VectorOf<Dim>& normal) const;

@@ -13,6 +13,7 @@ ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene) {
   impulses.contact.resize(Dim, scene.contact_points.count());
   impulses.contact_nodes.resize(Dim, scene.body.node_count());
   impulses.effect_nodes.resize(Dim, scene.body.node_count());
+  impulses.hold.resize(Dim, static_cast<Eigen::Index>(scene.body.held.size()));
   clear(impulses);
   return impulses;
 }
@@ -25,6 +26,7 @@ void clear(ImpulsesOf<Dim>& impulses) {
   impulses.effect_nodes.setZero();
   impulses.effect_moment.setZero();
   impulses.gravity_moment.setZero();
+  impulses.hold.setZero();
   impulses.obstacle_work = 0;
 }
 

@@ -31,6 +31,7 @@ struct ImpulsesOf {
   PointsOf<Dim> effect_nodes;   // Dim x N, declared effects (pushes)
   SpinOf<Dim> effect_moment;    // [N m s]
   SpinOf<Dim> gravity_moment;   // [N m s]
+  PointsOf<Dim> hold;           // Dim x held nodes, by what holds them where they are
   double obstacle_work = 0;     // [J] done on the body by obstacles that move and by what lifts it out of them
 };
 using Impulses = ImpulsesOf<3>;

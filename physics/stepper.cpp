@@ -8,6 +8,8 @@ std::string name_of(Method method) {
       return "explicit";
     case Method::kEuler:
       return "euler";
+    case Method::kImplicit:
+      return "implicit";
   }
   return {};
 }
@@ -16,9 +18,11 @@ template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene) {
   switch (method) {
     case Method::kExplicit:
-      return make_explicit_stepper(scene);
+      return make_guarded_stepper(scene, make_explicit_stepper(scene));
     case Method::kEuler:
       return make_euler_stepper(scene);
+    case Method::kImplicit:
+      return make_guarded_stepper(scene, make_implicit_stepper(scene));
   }
   return nullptr;
 }

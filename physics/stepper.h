@@ -20,18 +20,30 @@ class StepperOf {
                            StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) = 0;
   /// The method's own substep [s] for an outer step dt from the rest shape.
   virtual double substep(double dt) const = 0;
+  /// To be called when the next state is not the one that the last step left behind.
+  virtual void forget() {}
+  /// Steps so far in which another method took over.
+  virtual long guard_steps() const { return 0; }
 };
 using Stepper = StepperOf<3>;
 
-enum class Method { kExplicit, kEuler };
+enum class Method { kExplicit, kEuler, kImplicit };
 std::string name_of(Method method);
-/// Throws nothing; every scene is accepted. The scene must outlive the stepper.
+/// explicit and implicit come guarded (make_guarded_stepper). Throws nothing; every scene is accepted. The scene must outlive
+/// the stepper.
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene);
+
+/// A step of `accurate` that ends with an inverted tet, with much more energy than was there or was brought in, or with what
+/// is no number is taken again by euler, and so is every step from a state with an inverted tet.
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate);
 
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene);
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_euler_stepper(const SceneOf<Dim>& scene);
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_implicit_stepper(const SceneOf<Dim>& scene);
 
 }  // namespace hydrostat::physics

@@ -8,6 +8,11 @@
 #include "physics/elastic_forces.h"
 
 namespace hydrostat::physics {
+namespace {
+
+constexpr double kHeld = 1e12;  // times its own stiffness: what a held node resists with
+
+}  // namespace
 
 template <int Dim>
 SystemMatrixOf<Dim>::SystemMatrixOf(const BodyOf<Dim>& body) {
@@ -167,7 +172,7 @@ void SystemMatrixOf<Dim>::add_stiffness(const BodyOf<Dim>& body, const ConstPoin
     add_diagonal(j, block);
     add_off_diagonal(e, -block);
   }
-  for (int t = 0; t < body.tet_count(); ++t) {
+  for (int t = 0; t < body.volume_stiffness.size(); ++t) {
     double jacobian;
     const Eigen::Matrix<double, Dim, Dim + 1> g = jacobian_gradient<Dim>(x, body.tets, t, body.rest_volume[t], jacobian);
     const double k = factor * body.volume_stiffness[t];
@@ -180,6 +185,28 @@ void SystemMatrixOf<Dim>::add_stiffness(const BodyOf<Dim>& body, const ConstPoin
         add_off_diagonal(body.tet_edges(edge, t), k * high * low.transpose());
       }
     }
+  }
+}
+
+template <int Dim>
+void SystemMatrixOf<Dim>::add_element(const ElementBlock<Dim>& block, int element, const Eigen::MatrixXi& edges,
+                                      const ElementMatrix& stiffness, double factor) {
+  for (int a = 0, pair = 0; a < block.nodes_per_element(); ++a) {
+    const int node_a = block.nodes(a, element);
+    add_diagonal(node_a, factor * stiffness.block<Dim, Dim>(Dim * a, Dim * a));
+    for (int b = a + 1; b < block.nodes_per_element(); ++b, ++pair) {
+      const int node_b = block.nodes(b, element);
+      const auto [high, low] = node_a < node_b ? std::pair(b, a) : std::pair(a, b);  // of the block that the matrix keeps
+      add_off_diagonal(edges(pair, element), factor * stiffness.block<Dim, Dim>(Dim * high, Dim * low));
+    }
+  }
+}
+
+template <int Dim>
+void SystemMatrixOf<Dim>::hold(const std::vector<int>& nodes) {
+  double* const values = matrix_.valuePtr();
+  for (const int node : nodes) {
+    for (int c = 0; c < Dim; ++c) values[diagonal_slot_(c, node)] *= kHeld;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "physics/contact.h"
+#include "physics/element_stiffness.h"
 
 namespace hydrostat::physics {
 
@@ -20,6 +21,11 @@ class SystemMatrixOf {
   /// Adds factor * K(x, activation), the positive semi-definite part of the elastic Hessian: an edge under compression
   /// loses its buckling term, a tet keeps kappa V grad J grad J^T.
   void add_stiffness(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const Eigen::VectorXd& activation, double factor);
+  /// Adds factor * stiffness, of an element of a block; `edges` as ActivationFit::of_element.
+  void add_element(const ElementBlock<Dim>& block, int element, const Eigen::MatrixXi& edges, const ElementMatrix& stiffness,
+                   double factor);
+  /// Makes the nodes so heavy that solutions leave them where they are: to be called after all that adds.
+  void hold(const std::vector<int>& nodes);
   /// Adds factor * D(x), the dashpots' matrix.
   void add_damping(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, double factor);
   /// Adds w_i w_j * block for the nodes i, j of contact point p; block is symmetric.

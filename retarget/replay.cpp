@@ -215,6 +215,7 @@ Replay Run::play() {
 Replay Run::finish(long rows) {
   ReplayReport& report = result_.report;
   report = metrics_.figures();
+  report.guard_steps = static_cast<int>(stepper_->guard_steps());
   report.real_time_factor = busy_s_ > 0 ? time_s_ / busy_s_ : 0;
   if (fall_) {
     report.fell = true;

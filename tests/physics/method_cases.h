@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+
 #include "tests/physics/lattice_scene.h"
 
 namespace hydrostat::physics {
@@ -16,8 +18,18 @@ struct CaseName {
   }
 };
 /// Every method in both dimensions.
-using Cases =
-    testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>>;
+using Cases = testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kImplicit>,
+                             Case<3, Method::kImplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>>;
+
+/// What the method may lose of angular momentum in a step of a body about a metre long, over its mass [m2/s].
+inline double angular_tolerance(Method method) {
+  switch (method) {
+    case Method::kExplicit: return 1e-12;  // rounding
+    case Method::kImplicit: return 1e-6;   // what its solver leaves
+    case Method::kEuler: break;
+  }
+  return std::numeric_limits<double>::infinity();  // its own, told in its header
+}
 
 /// Steps a scene with one method and gives each step to `look(before, after, impulses)`.
 template <int Dim, typename Look>

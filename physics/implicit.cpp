@@ -1,0 +1,324 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "physics/elastic_forces.h"
+#include "physics/internal_forces.h"
+#include "physics/penalty_contact.h"
+#include "physics/stepper.h"
+
+namespace hydrostat::physics {
+namespace {
+
+constexpr int kIterations = 200;  // ten are the rule
+constexpr int kMemory = 8;        // pairs of L-BFGS
+constexpr int kPatience = 20;     // iterations between two new matrices
+constexpr int kSlow = 12;         // a step of more iterations makes the next one start from a new matrix
+// Normal forces set Coulomb's limits, and these the normal forces: where the two go round in circles the limits follow by
+// smaller and smaller parts.
+constexpr int kFreeUpdates = 3;
+constexpr double kShorterUpdate = 0.7;
+// A node's residual force is told as the velocity that it would give the node in a step, over the body's size [1/s].
+constexpr double kResidual = 1e-5;      // small enough: a turning body loses angular momentum by it
+constexpr double kInnerDecrease = 0.3;  // of the residual [-] between two updates of the friction limits
+constexpr double kGivenUp = 1e-2;       // after the last iterate: no solution was found
+constexpr double kArmijo = 1e-4;
+constexpr int kHalvings = 20;
+constexpr double kReach = 0.25;      // of the body's size [-]: what is nearer than that is watched
+constexpr double kRounding = 1e-12;  // of the potential [-]: a smaller decrease is none
+
+/// Implicit midpoint as the minimum of a potential, by L-BFGS on top of a factored Hessian that is kept from step to step and
+/// made anew where convergence is slow.
+///
+/// Internal forces are those of the middle x_m = (x0 + x1) / 2, so they change neither momentum nor angular momentum, but for
+/// what the solver leaves (kResidual). Dashpots pull along the edges of the middle, too. Contact comes in two impulses, one
+/// before the motion and one after it: the first keeps the places at the end of the step out of the obstacles, a stiff spring
+/// on x1 with anchored friction as in euler, booked where the step starts; the second, booked where it ends, takes away what
+/// velocity of touching places still approaches or slides. A body at rest thus has no velocity, and both impulses together
+/// are its weight.
+/// Source: Liu, Bouaziz, Kavan, "Quasi-Newton methods for real-time simulation of hyperelastic materials", TOG 36(3), 2017,
+/// section 4 (we take the projected Hessian of a past state for their Laplacian); Hairer, Lubich, Wanner, "Geometric numerical
+/// integration", 2006, section IV.2.1 for what the midpoint rule keeps.
+template <int Dim>
+class ImplicitStepper final : public StepperOf<Dim> {
+ public:
+  explicit ImplicitStepper(const SceneOf<Dim>& scene)
+      : scene_(scene),
+        forces_(scene.body),
+        matrix_(scene.body),
+        contact_(scene),
+        size_(size_of_volume<Dim>(scene.body.rest_volume.sum())),
+        inverse_mass_(inverse_masses(scene.body)),
+        ones_(Eigen::VectorXd::Ones(scene.body.edge_count())),
+        foreseen_(scene.body.rest),
+        middle_(scene.body.rest),
+        trial_(scene.body.rest),
+        force_(scene.body.rest),
+        residual_(scene.body.rest),
+        last_residual_(scene.body.rest),
+        direction_(Dim * scene.body.node_count()),
+        start_{scene.body.rest, scene.body.rest} {
+    dashpots_.mass = scene.body.mass;
+    dashpots_.edges = scene.body.edges;
+    dashpots_.rest_length = scene.body.rest_length;
+    dashpots_.edge_stiffness = scene.body.edge_damping;
+    for (Pair& pair : pairs_) pair = {direction_, direction_, 0};
+  }
+
+  double substep(double dt) const override { return dt; }
+
+  void forget() override { contact_.forget(); }
+
+  Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
+                   ImpulsesOf<Dim>& impulses) override {
+    if (!forces_.set_activation(activation)) return Termination::kDiverged;
+    begin(dt, effect_force, state);
+    const bool is_solved = minimise(state.x);
+    book(effect_force, state, impulses);
+    if (!is_solved || !state.v.allFinite()) {
+      state = start_;
+      has_matrix_ = false;
+      return Termination::kDiverged;
+    }
+    if (contact_.is_needed()) contact_.end(state.x, state.obstacle_travel);
+    return Termination::kDone;
+  }
+
+ private:
+  struct Pair {
+    Eigen::VectorXd step, change;  // of the places and of the residual
+    double inverse_product;
+  };
+
+  void begin(double dt, const PointsOf<Dim>* effect_force, StateOf<Dim>& state) {
+    const BodyOf<Dim>& body = scene_.body;
+    start_ = state;
+    for (const int node : body.held) state.v.col(node).setZero();
+    if (dt != dt_) has_matrix_ = false;
+    dt_ = dt;
+    trial_ = state.x + dt * state.v;
+    foreseen_ = trial_;
+    for (int i = 0; i < body.node_count(); ++i) {
+      foreseen_.col(i) += (0.5 * dt * dt) * scene_.gravity;
+      if (effect_force != nullptr) foreseen_.col(i) += (0.5 * dt * dt / body.mass[i]) * effect_force->col(i);
+    }
+    for (const int node : body.held) foreseen_.col(node) = state.x.col(node);
+    if (forces_.has_dashpots()) lay_dashpots(dt);
+    if (contact_.is_needed()) {
+      contact_.begin(start_, foreseen_, dt, reach());
+      contact_.update_friction(state.x);
+    }
+    if (potential(trial_) < potential(state.x)) state.x = trial_;
+  }
+
+  /// Farther than the body will move against the obstacles in this step [m].
+  double reach() const {
+    double farthest = 0;
+    for (int i = 0; i < scene_.body.node_count(); ++i) {
+      farthest = std::max(farthest, std::max(dt_ * start_.v.col(i).norm(), (foreseen_.col(i) - start_.x.col(i)).norm()));
+    }
+    return 2 * farthest + kReach * size_;
+  }
+
+  /// A dashpot pulls at c n_m . (s1 - s0) / h = (2 c / h) (l_m - n_m . s0), s the span and n_m its direction in the middle: a
+  /// spring, when n_m . s0 is taken at the middle that the velocities foresee.
+  void lay_dashpots(double dt) {
+    const BodyOf<Dim>& body = scene_.body;
+    dashpots_.edge_stiffness = (2 / dt) * body.edge_damping;
+    for (int e = 0; e < body.edge_count(); ++e) {
+      const int i = body.edges(0, e), j = body.edges(1, e);
+      const VectorOf<Dim> span = start_.x.col(j) - start_.x.col(i);
+      const VectorOf<Dim> foreseen = span + 0.5 * dt * (start_.v.col(j) - start_.v.col(i));
+      const double length = foreseen.norm();
+      dashpots_.rest_length[e] = length > 0 ? foreseen.dot(span) / length : 0;
+    }
+  }
+
+  /// What the step minimises over the places at its end [J].
+  double potential(const PointsOf<Dim>& x) {
+    middle_ = 0.5 * (start_.x + x);
+    double sum = 2 * forces_.elastic_energy(middle_);
+    if (forces_.has_dashpots()) sum += 2 * elastic_energy<Dim>(dashpots_, middle_, ones_);
+    for (int i = 0; i < scene_.body.node_count(); ++i) {
+      sum += scene_.body.mass[i] * (x.col(i) - foreseen_.col(i)).squaredNorm() / (dt_ * dt_);
+    }
+    return contact_.is_needed() ? sum + contact_.potential(x) : sum;
+  }
+
+  /// Fills residual_, the gradient of the potential [N], and force_, of the middle, without contact.
+  void find_residual(const PointsOf<Dim>& x) {
+    const BodyOf<Dim>& body = scene_.body;
+    middle_ = 0.5 * (start_.x + x);
+    force_.setZero();
+    forces_.add_elastic_forces(middle_, force_);
+    if (forces_.has_dashpots()) add_elastic_forces<Dim>(dashpots_, middle_, ones_, force_);
+    residual_.setZero();
+    if (contact_.is_needed()) contact_.add_forces(x, residual_);
+    for (int i = 0; i < body.node_count(); ++i) {
+      residual_.col(i) = (2 * body.mass[i] / (dt_ * dt_)) * (x.col(i) - foreseen_.col(i)) - force_.col(i) - residual_.col(i);
+    }
+    for (const int node : body.held) residual_.col(node).setZero();
+  }
+
+  double residual_speed() const {
+    double largest = 0;
+    for (int i = 0; i < scene_.body.node_count(); ++i) {
+      const double speed = residual_.col(i).norm() * dt_ / scene_.body.mass[i];
+      if (!(speed <= largest)) largest = speed;
+    }
+    return largest;
+  }
+
+  bool minimise(PointsOf<Dim>& x) {
+    find_residual(x);
+    count_ = 0;
+    since_matrix_ = 0;
+    double enough = kResidual * size_, part = 1, last = std::numeric_limits<double>::infinity();
+    int k = 0, updates = 0;
+    for (; k < kIterations; ++k) {
+      if (residual_speed() <= enough) {
+        if (!contact_.is_needed()) break;
+        contact_.update_friction(x);
+        find_residual(x);
+        count_ = 0;  // the pairs are of another potential
+        if (residual_speed() <= kResidual * size_) break;
+        if (++updates > kFreeUpdates) {
+          if (residual_speed() > kShorterUpdate * last) part *= kShorterUpdate;
+          last = residual_speed();
+          contact_.shorten_friction_update(part);
+          find_residual(x);
+        }
+        enough = std::max(kResidual * size_, kInnerDecrease * residual_speed());
+      }
+      if (!has_matrix_ || since_matrix_ >= kPatience) {
+        if (!make_matrix(x)) return false;
+      }
+      if (move_downhill(x)) {
+        ++since_matrix_;
+      } else if (since_matrix_ == 0) {
+        break;  // not along the Hessian's own direction either
+      } else {
+        has_matrix_ = false;
+      }
+    }
+    if (k > kSlow) has_matrix_ = false;
+    if (contact_.is_needed()) contact_.update_friction(x);
+    find_residual(x);
+    return residual_speed() <= kGivenUp * size_;
+  }
+
+  bool make_matrix(const PointsOf<Dim>& x) {
+    middle_ = 0.5 * (start_.x + x);
+    matrix_.set_zero();
+    matrix_.add_mass(scene_.body, 2 / (dt_ * dt_));
+    forces_.add_stiffness(middle_, 0.5, matrix_);
+    if (forces_.has_dashpots()) matrix_.add_stiffness(dashpots_, middle_, ones_, 0.5);
+    if (contact_.is_needed()) contact_.add_stiffness(x, 1, matrix_);
+    matrix_.hold(scene_.body.held);
+    has_matrix_ = matrix_.factor();
+    count_ = 0;
+    since_matrix_ = 0;
+    return has_matrix_;
+  }
+
+  /// Two-loop recursion. Source: Nocedal, Wright, "Numerical optimization", 2006, algorithm 7.4.
+  void find_direction() {
+    std::array<double, kMemory> along{};
+    const int oldest = std::max(0, count_ - kMemory);
+    direction_ = -residual_.reshaped();
+    for (int k = count_ - 1; k >= oldest; --k) {
+      const Pair& pair = pairs_[static_cast<std::size_t>(k % kMemory)];
+      along[static_cast<std::size_t>(k % kMemory)] = pair.inverse_product * pair.step.dot(direction_);
+      direction_ -= along[static_cast<std::size_t>(k % kMemory)] * pair.change;
+    }
+    matrix_.solve_in_place(direction_);
+    for (int k = oldest; k < count_; ++k) {
+      const Pair& pair = pairs_[static_cast<std::size_t>(k % kMemory)];
+      const double back = pair.inverse_product * pair.change.dot(direction_);
+      direction_ += (along[static_cast<std::size_t>(k % kMemory)] - back) * pair.step;
+    }
+    for (const int node : scene_.body.held) direction_.template segment<Dim>(Dim * node).setZero();
+  }
+
+  /// One step with line search; leaves residual_ at its end. False: the potential cannot be lowered along it.
+  bool move_downhill(PointsOf<Dim>& x) {
+    find_direction();
+    const double here = potential(x), slope = residual_.reshaped().dot(direction_);
+    if (!(slope < 0)) return false;
+    double part = 1;
+    for (int k = 0; k < kHalvings; ++k, part /= 2) {
+      trial_ = x + part * direction_.reshaped(Dim, x.cols());
+      if (!(potential(trial_) <= here + kArmijo * part * slope + kRounding * std::abs(here))) continue;
+      x.swap(trial_);
+      last_residual_ = residual_;
+      find_residual(x);
+      Pair& pair = pairs_[static_cast<std::size_t>(count_ % kMemory)];
+      pair.step = part * direction_;
+      pair.change = (residual_ - last_residual_).reshaped();
+      const double product = pair.step.dot(pair.change);
+      if (product > 0) {
+        pair.inverse_product = 1 / product;
+        ++count_;
+      }
+      return true;
+    }
+    return false;
+  }
+
+  void book(const PointsOf<Dim>* effect_force, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
+    const BodyOf<Dim>& body = scene_.body;
+    clear(impulses);
+    if (contact_.is_needed()) contact_.book(0.5 * dt_, start_.x, impulses);
+    middle_ = 0.5 * (start_.x + state.x);
+    if (effect_force != nullptr) {
+      impulses.effect_nodes = dt_ * *effect_force;
+      for (int i = 0; i < body.node_count(); ++i) {
+        impulses.effect_moment += dt_ * cross<Dim>(middle_.col(i), effect_force->col(i));
+      }
+    }
+    impulses.gravity_moment = dt_ * cross<Dim>(middle_ * body.mass, scene_.gravity);
+    for (int i = 0; i < body.node_count(); ++i) {
+      const VectorOf<Dim> impulse = dt_ * force_.col(i) + impulses.contact_nodes.col(i) + impulses.effect_nodes.col(i);
+      state.v.col(i) = start_.v.col(i) + impulse / body.mass[i] + dt_ * scene_.gravity;
+    }
+    for (std::size_t n = 0; n < body.held.size(); ++n) {
+      const int node = body.held[n];
+      impulses.hold.col(static_cast<Eigen::Index>(n)) = impulses.contact_nodes.col(node) - body.mass[node] * state.v.col(node);
+      state.v.col(node).setZero();
+    }
+    if (contact_.is_needed()) {
+      contact_.stop_approach(state.x, inverse_mass_, state.v);
+      contact_.book(1, state.x, impulses);
+    }
+    for (std::size_t n = 0; n < body.held.size(); ++n) {
+      impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.contact_nodes.col(body.held[n]);
+    }
+  }
+
+  const SceneOf<Dim>& scene_;
+  InternalForces<Dim> forces_;
+  SystemMatrixOf<Dim> matrix_;
+  PenaltyContact<Dim> contact_;
+  double size_, dt_ = 0;  // [m], [s]
+  Eigen::VectorXd inverse_mass_, ones_;
+  BodyOf<Dim> dashpots_;    // as springs of this step
+  PointsOf<Dim> foreseen_;  // [m] where velocities, gravity and effects alone take the nodes
+  PointsOf<Dim> middle_, trial_, force_, residual_, last_residual_;
+  Eigen::VectorXd direction_;
+  StateOf<Dim> start_;
+  std::array<Pair, kMemory> pairs_;
+  int count_ = 0, since_matrix_ = 0;  // pairs since they were last cleared; iterations since the matrix was made
+  bool has_matrix_ = false;
+};
+
+}  // namespace
+
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_implicit_stepper(const SceneOf<Dim>& scene) {
+  return std::make_unique<ImplicitStepper<Dim>>(scene);
+}
+template std::unique_ptr<StepperOf<2>> make_implicit_stepper<2>(const SceneOf<2>&);
+template std::unique_ptr<StepperOf<3>> make_implicit_stepper<3>(const SceneOf<3>&);
+
+}  // namespace hydrostat::physics

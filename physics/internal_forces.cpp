@@ -1,0 +1,105 @@
+#include "physics/internal_forces.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics/elastic_forces.h"
+#include "physics/element_forces.h"
+
+namespace hydrostat::physics {
+
+template <int Dim>
+InternalForces<Dim>::InternalForces(const BodyOf<Dim>& body)
+    : body_(body),
+      has_springs_(body.elements.empty() || !body.edge_stiffness.isZero(0) || body.volume_stiffness.size() > 0),
+      has_dashpots_(body.elements.empty() || !body.edge_damping.isZero(0)),
+      activation_(Eigen::VectorXd::Ones(body.edge_count())),
+      inverse_mass_(body.mass.cwiseInverse()) {
+  for (const BodyElements<Dim>& elements : body.elements) active_.push_back(make_active_strain(elements.block));
+  stiffest_volume_at_rest_ = stiffest_volume(body.rest);
+}
+
+template <int Dim>
+bool InternalForces<Dim>::set_activation(const Eigen::VectorXd& activation) {
+  if (active_.empty() || activation != activation_) {
+    activation_ = activation;
+    for (std::size_t n = 0; n < active_.size(); ++n) {
+      if (!physics::set_activation(body_.elements[n].fit, activation, active_[n])) {
+        activation_.setConstant(std::nan(""));  // the strains hold nothing: the next call sets them
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+template <int Dim>
+double InternalForces<Dim>::elastic_energy(const PointsOf<Dim>& x) const {
+  double energy = has_springs_ ? physics::elastic_energy(body_, x, activation_) : 0;
+  for (std::size_t n = 0; n < active_.size(); ++n) {
+    const ElementBlock<Dim>& block = body_.elements[n].block;
+    energy += element_energy<Dim>(block, x, &active_[n], all_batches(block));
+  }
+  return energy;
+}
+
+template <int Dim>
+void InternalForces<Dim>::add_elastic_forces(const PointsOf<Dim>& x, PointsOf<Dim>& force) const {
+  if (has_springs_) physics::add_elastic_forces(body_, x, activation_, force);
+  for (std::size_t n = 0; n < active_.size(); ++n) {
+    const ElementBlock<Dim>& block = body_.elements[n].block;
+    add_element_forces<Dim>(block, x, &active_[n], all_batches(block), force);
+  }
+}
+
+template <int Dim>
+void InternalForces<Dim>::add_forces(const StateOf<Dim>& state, PointsOf<Dim>& force) const {
+  if (has_springs_ || has_dashpots_) add_internal_forces(body_, state, activation_, force);
+  for (std::size_t n = 0; n < active_.size(); ++n) {
+    const ElementBlock<Dim>& block = body_.elements[n].block;
+    add_element_forces<Dim>(block, state.x, &active_[n], all_batches(block), force);
+  }
+}
+
+template <int Dim>
+void InternalForces<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) const {
+  if (has_springs_) matrix.add_stiffness(body_, x, activation_, factor);
+  for (std::size_t n = 0; n < active_.size(); ++n) {
+    const ElementBlock<Dim>& block = body_.elements[n].block;
+    for (int e = 0; e < block.element_count(); ++e) {
+      const ElementMatrix stiffness = element_stiffness<Dim>(block, e, x, &active_[n], Definiteness::kProjected);
+      matrix.add_element(block, e, body_.elements[n].fit.of_element, stiffness, factor);
+    }
+  }
+}
+
+/// Largest of the tets' own frequencies squared [1/s2] by their volume springs: these stiffen with the square of the area of
+/// their faces.
+template <int Dim>
+double InternalForces<Dim>::stiffest_volume(const PointsOf<Dim>& x) const {
+  double largest = 0;
+  for (int t = 0; t < body_.volume_stiffness.size(); ++t) {
+    double jacobian;
+    const Eigen::Matrix<double, Dim, Dim + 1> gradient =
+        jacobian_gradient<Dim>(x, body_.tets, t, body_.rest_volume[t], jacobian);
+    double sum = 0;
+    for (int k = 0; k <= Dim; ++k) sum += gradient.col(k).squaredNorm() * inverse_mass_[body_.tets(k, t)];
+    largest = std::max(largest, body_.volume_stiffness[t] * sum);
+  }
+  return largest;
+}
+
+template <int Dim>
+double InternalForces<Dim>::stiffening(const PointsOf<Dim>& x) const {
+  double growth = 1;
+  if (stiffest_volume_at_rest_ > 0) growth = std::max(growth, stiffest_volume(x) / stiffest_volume_at_rest_);
+  for (std::size_t n = 0; n < active_.size(); ++n) {
+    growth = std::max(growth, element_stiffening<Dim>(body_.elements[n].block, x, &active_[n]));
+  }
+  return growth;
+}
+
+template class InternalForces<2>;
+template class InternalForces<3>;
+
+}  // namespace hydrostat::physics

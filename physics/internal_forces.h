@@ -1,0 +1,42 @@
+#pragma once
+
+#include <vector>
+
+#include "physics/system_matrix.h"
+
+namespace hydrostat::physics {
+
+/// All forces inside one body, for every method: springs and dashpots along edges, volumes, finite elements. What a body does
+/// not have costs nothing; after construction nothing is allocated.
+template <int Dim>
+class InternalForces {
+ public:
+  explicit InternalForces(const BodyOf<Dim>& body);
+
+  /// Holds the activations [-], E, for what follows; to be called before it. False: elements have no shape for them, for one
+  /// is not above 0 or not finite.
+  bool set_activation(const Eigen::VectorXd& activation);
+  const Eigen::VectorXd& activation() const { return activation_; }
+
+  double elastic_energy(const PointsOf<Dim>& x) const;                          // [J]
+  void add_elastic_forces(const PointsOf<Dim>& x, PointsOf<Dim>& force) const;  // [N]
+  /// Elastic forces and the dashpots'.
+  void add_forces(const StateOf<Dim>& state, PointsOf<Dim>& force) const;
+  /// The positive semi-definite part of the elastic Hessian, as SystemMatrixOf::add_stiffness and element_stiffness have it.
+  void add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) const;
+  bool has_dashpots() const { return has_dashpots_; }
+
+  /// By how much the volumes and elements are stiffer at x than at rest [-]: an estimate that errs to the high side, >= 1.
+  double stiffening(const PointsOf<Dim>& x) const;
+
+ private:
+  double stiffest_volume(const PointsOf<Dim>& x) const;
+
+  const BodyOf<Dim>& body_;
+  bool has_springs_, has_dashpots_;  // where there are none, elements bear all
+  Eigen::VectorXd activation_, inverse_mass_;
+  std::vector<ActiveStrain<Dim>> active_;
+  double stiffest_volume_at_rest_ = 0;  // [1/s2]
+};
+
+}  // namespace hydrostat::physics

@@ -1,0 +1,121 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "tests/physics/element_method_scene.h"
+
+namespace hydrostat::physics {
+namespace {
+
+constexpr double kDt = 1.0 / 240;
+
+template <typename Case>
+class Guard : public testing::Test {};
+using GuardedCases = testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kImplicit>,
+                                    Case<3, Method::kImplicit>>;
+TYPED_TEST_SUITE(Guard, GuardedCases, CaseName);
+
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_bare(Method method, const SceneOf<Dim>& scene) {
+  return method == Method::kExplicit ? make_explicit_stepper(scene) : make_implicit_stepper(scene);
+}
+
+TYPED_TEST(Guard, LeavesSoundStepsAsTheyAreToTheBit) {
+  constexpr int Dim = TypeParam::kDim;
+  const SceneOf<Dim> scene = scene_of(four_legged<Dim>(), soles(four_legged<Dim>()), slope<Dim>(10, 0.4));
+  const auto run = [&](StepperOf<Dim>& stepper) {
+    ImpulsesOf<Dim> impulses = make_impulses(scene);
+    StateOf<Dim> state = laid_down(scene, 0.05);
+    std::mt19937 random(1);
+    Eigen::VectorXd activation = passive(scene.body);
+    for (int k = 0; k < 120; ++k) {
+      if (k % 12 == 0) activation = random_activation(random, scene.body, 0.1);
+      EXPECT_EQ(stepper.step(kDt, activation, nullptr, state, impulses), Termination::kDone);
+    }
+    return state;
+  };
+  const std::unique_ptr<StepperOf<Dim>> guarded = make_stepper(TypeParam::kMethod, scene);
+  const StateOf<Dim> with = run(*guarded), without = run(*make_bare(TypeParam::kMethod, scene));
+  EXPECT_EQ(with.x, without.x);
+  EXPECT_EQ(with.v, without.v);
+  EXPECT_EQ(guarded->guard_steps(), 0);
+}
+
+TYPED_TEST(Guard, FindsBackFromRandomCollapsedAndFlattenedStarts) {
+  constexpr int Dim = TypeParam::kDim;
+  SceneOf<Dim> scene = cantilever<Dim>(Dim == 2 ? 2 : 1, Dim == 2 ? Cut::kTwoTriangles : Cut::kSixTets, {1000, 5e5, 0.4});
+  scene.body.held.clear();
+  scene.gravity.setZero();
+  const int nodes = scene.body.node_count();
+  for (unsigned seed = 0; seed < 2; ++seed) {
+    std::mt19937 random(seed);
+    PointsOf<Dim> flat = scene.body.rest;
+    flat.row(1).setZero();
+    const PointsOf<Dim> starts[] = {random_points<Dim>(random, nodes, 0.5), random_points<Dim>(random, nodes, 0.0005), flat};
+    for (int kind = 0; kind < 3; ++kind) {
+      SCOPED_TRACE("start " + std::to_string(kind) + ", seed " + std::to_string(seed));
+      const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+      ImpulsesOf<Dim> impulses = make_impulses(scene);
+      StateOf<Dim> state{starts[kind], PointsOf<Dim>::Zero(Dim, nodes)};
+      for (int k = 0; k < 240; ++k) {
+        ASSERT_EQ(stepper->step(kDt, passive(scene.body), nullptr, state, impulses), Termination::kDone) << "step " << k;
+      }
+      EXPECT_GT(stepper->guard_steps(), 0);
+      EXPECT_GT(jacobians(scene.body, state.x).minCoeff(), 0);
+      EXPECT_LT(momentum(scene.body, state.v).norm(), 1e-9 * scene.body.mass.sum());
+    }
+  }
+}
+
+/// Does to every step what its maker asks.
+template <int Dim>
+class Spoilt final : public StepperOf<Dim> {
+ public:
+  Spoilt(const SceneOf<Dim>& scene, std::function<Termination(StateOf<Dim>&)> spoil)
+      : stepper_(make_explicit_stepper(scene)), spoil_(std::move(spoil)) {}
+  Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
+                   ImpulsesOf<Dim>& impulses) override {
+    stepper_->step(dt, activation, effect_force, state, impulses);
+    return spoil_(state);
+  }
+  double substep(double dt) const override { return stepper_->substep(dt); }
+
+ private:
+  std::unique_ptr<StepperOf<Dim>> stepper_;
+  std::function<Termination(StateOf<Dim>&)> spoil_;
+};
+
+TYPED_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
+  constexpr int Dim = TypeParam::kDim;
+  const BodyOf<Dim> body = four_legged<Dim>();
+  const SceneOf<Dim> scene = scene_of(body, soles(body));
+  const std::function<Termination(StateOf<Dim>&)> spoils[] = {
+      [](StateOf<Dim>& state) { return state.v *= 4, Termination::kDone; },
+      [&](StateOf<Dim>& state) {
+        const VectorOf<Dim> across = state.x.col(body.tets(1, 0)) - state.x.col(body.tets(0, 0));
+        state.x.col(body.tets(0, 0)) += 2 * across;
+        return Termination::kDone;
+      },
+      [](StateOf<Dim>& state) { return state.v(0, 0) = std::nan(""), Termination::kDone; },
+      [](StateOf<Dim>&) { return Termination::kDiverged; }};
+  for (const auto& spoil : spoils) {
+    int steps = 0;
+    const auto in_the_fifth = [&](StateOf<Dim>& state) { return ++steps == 5 ? spoil(state) : Termination::kDone; };
+    const std::unique_ptr<StepperOf<Dim>> stepper =
+        make_guarded_stepper<Dim>(scene, std::make_unique<Spoilt<Dim>>(scene, in_the_fifth));
+    ImpulsesOf<Dim> impulses = make_impulses(scene);
+    StateOf<Dim> state = laid_down(scene, 0.001);
+    state.v.row(1).setConstant(-1);
+    for (int k = 0; k < 12; ++k) {
+      const StateOf<Dim> before = state;
+      ASSERT_EQ(stepper->step(kDt, passive(body), nullptr, state, impulses), Termination::kDone);
+      EXPECT_LT(momentum_residual(scene, before, state, impulses, kDt), 1e-6) << k;
+      EXPECT_EQ(stepper->guard_steps(), k < 4 ? 0 : 1);
+    }
+    EXPECT_GT(jacobians(body, state.x).minCoeff(), 0);
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::physics

@@ -103,7 +103,7 @@ export class Stage {
     const box = page.report.simulation ? box_of_motion(page.motions[0]) : null;
     // A scene that fits into the view is seen as a whole; otherwise the view goes with the body, as it does with a creature.
     this.whole = box && box.size < 10 * this.length ? box : null;
-    if (this.whole) this.length = Math.max(this.length, 0.75 * box.size);
+    if (this.whole) this.length = Math.max(this.length, 0.5 * box.size);
     this.view = 'overlay';
     this.follows = true;
     this.shows_mesh = false;

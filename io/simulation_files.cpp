@@ -95,7 +95,7 @@ std::vector<PageChart> charts_of(const ScenarioOf<Dim>& scenario, const Simulati
       chart("Speed of the centre of mass", "speed [m/s]", course, {{"speed", speed_of(course)}}),
       chart("Change of the whole body's volume", "change [%]", course, {{"volume", 100 * (course.volume_ratio.array() - 1)}})};
   if (scenario.scene.has_ground || !scenario.scene.obstacles.empty()) {
-    charts.push_back(chart("Force of contact", "force over weight [-]", course, {{"contact", course.contact_weights}}));
+    charts.push_back(chart("Forces of contact, added up", "force over weight [-]", course, {{"contact", course.contact_weights}}));
     charts.push_back(chart("Deepest penetration", "depth [% D]", course, {{"penetration", 100 / scenario.size * course.penetration_m}}));
   }
   if (!scenario.waves.empty()) charts.push_back(chart("Mean activation", "activation [-]", course, {{"mean", course.mean_activation}}));

@@ -259,7 +259,7 @@ void Course<Dim>::write_frame() {
   frames_.push_back(column_of<Dim>(state_.x));
   travels_.push_back(state_.obstacle_travel);
   com_.push_back(in_space<Dim>(physics::centre_of_mass(body_, state_.x)));
-  const double force = impulses_.contact_nodes.rowwise().sum().norm() / options_.dt_s;
+  const double force = impulses_.contact.colwise().norm().sum() / options_.dt_s;
   course_.push_back({static_cast<double>(done_) * options_.dt_s, here.kinetic, here.elastic, here.gravity, work_,
                      physics::volume(body_, state_.x) / rest_volume_, penetration(scene_, state_), force / weight_, activation_.mean()});
 }

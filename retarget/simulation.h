@@ -24,7 +24,8 @@ struct SimulationCourse {
   Eigen::VectorXd time_s;
   Eigen::Matrix3Xd com;                                  // [m]
   Eigen::VectorXd kinetic_j, elastic_j, gravity_j, work_j;  // work: done on the body since the start
-  Eigen::VectorXd volume_ratio, penetration_m, contact_weights, mean_activation;
+  Eigen::VectorXd volume_ratio, penetration_m, mean_activation;
+  Eigen::VectorXd contact_weights;  // sizes of the forces at all contact points, added up
 };
 
 /// What came of a scene. In 2D, z = 0.

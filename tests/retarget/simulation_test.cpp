@@ -26,6 +26,12 @@ ScenarioOf<Dim> cube_at(double height) {
   return scenario;
 }
 
+/// The ground bears the weight, and friction holds the sole that bulges under it.
+void expect_to_lie(double contact_weights) {
+  EXPECT_GT(contact_weights, 0.98);
+  EXPECT_LT(contact_weights, std::hypot(1, physics::Ground{}.friction));
+}
+
 template <typename Dimension>
 class Simulations : public testing::Test {};
 using Dimensions = testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
@@ -39,7 +45,9 @@ TYPED_TEST(Simulations, FallFreelyUntilTheyTouch) {
   const Simulation run = simulate(scenario, options);
   const double t = run.course.time_s.tail<1>()[0];
   EXPECT_NEAR(t, 0.4, 1e-12);
-  EXPECT_NEAR(run.course.com(1, 0) - run.course.com.row(1).tail<1>()[0], 0.5 * 9.81 * t * t, 2e-3);
+  // Symplectic Euler's parabola lies half a substep ahead.
+  const double h = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
+  EXPECT_NEAR(run.course.com(1, 0) - run.course.com.row(1).tail<1>()[0], 0.5 * 9.81 * t * (t + h), 1e-9);
   EXPECT_EQ(run.course.contact_weights.maxCoeff(), 0);
   EXPECT_LT(run.report.momentum_residual_mg, 1e-10);
   EXPECT_LT(run.report.angular_residual_mgl, 1e-10);
@@ -58,7 +66,7 @@ TYPED_TEST(Simulations, ComeToRestOnTheGround) {
     options.method = method;
     options.duration_s = 1.5;
     const Simulation run = simulate(cube_at<Dim>(0.02), options);
-    EXPECT_NEAR(run.course.contact_weights.tail<1>()[0], 1, 0.02);
+    expect_to_lie(run.course.contact_weights.tail<1>()[0]);
     EXPECT_LT(run.report.speed_end_m_s, 0.01);
     EXPECT_LT(run.report.momentum_residual_mg, 1e-6);
     EXPECT_LT(run.report.penetration_max_size, 0.02);
@@ -125,6 +133,7 @@ TYPED_TEST(Simulations, AccountForTheWorkOfActivationsPushesAndPlates) {
   wave.frequency_hz = 1;
   scenario.waves = {wave};
   SimulationOptions options;
+  options.dt_s = 1.0 / 2000;  // the energy of symplectic Euler errs with the substep
   options.duration_s = 1;
   const Simulation run = simulate(scenario, options);
   const SimulationReport& report = run.report;
@@ -154,7 +163,7 @@ TYPED_TEST(Simulations, MoveTheirObstaclesForAWhile) {
   EXPECT_GT(run.course.contact_weights[42], 1.5);
   EXPECT_GT(run.report.work_mgl, 0.01);
   EXPECT_LT(run.report.energy_excess_mgl, 0.01 * run.report.work_mgl);
-  EXPECT_NEAR(run.course.contact_weights[72], 1, 0.1);
+  expect_to_lie(run.course.contact_weights[72]);
 }
 
 TYPED_TEST(Simulations, ThatDivergeSayWhenAndKeepWhatCameBefore) {

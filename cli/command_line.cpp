@@ -55,6 +55,7 @@ std::shared_ptr<CLI::App> command_line(int& exit_code) {
   add_info(*app, exit_code);
   add_convert(*app, exit_code);
   add_replay(*app, exit_code);
+  add_simulate(*app, exit_code);
   add_signals(*app, exit_code);
   add_batch(*app, exit_code);
   return app;

@@ -13,6 +13,7 @@ namespace hydrostat::cli {
 void add_info(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
+void add_simulate(CLI::App& app, int& exit_code);
 void add_signals(CLI::App& app, int& exit_code);
 void add_batch(CLI::App& app, int& exit_code);
 

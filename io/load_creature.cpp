@@ -45,6 +45,9 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
                               signals_file = creature / "signals.json";
   LoadedCreature loaded;
   loaded.record = read_creature_record(creature);
+  if (setting(loaded.record, "kind", "") == "scene") {
+    throw Error(creature.string(), "", "holds a scene's simulation, not a creature", "Simulate the scene again with 'hydrostat simulate'.");
+  }
   loaded.target = parse_target(read_file(target_file), target_file.string());
   loaded.target.performer.clip_rise = loaded.record.clip_rise_m;
   parse_body(read_file(body_file), body_file.string(), loaded.target.performer);

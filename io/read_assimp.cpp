@@ -39,7 +39,7 @@ std::string_view pivot_of(std::string_view name) {
 
 std::string format_of(const std::string& path) {
   const auto ends_in = [&](char letter) { return std::tolower(static_cast<unsigned char>(path.back())) == letter; };
-  return ends_in('x') ? "fbx" : ends_in('e') ? "collada" : "bvh";
+  return ends_in('x') ? "fbx" : ends_in('e') ? "collada" : ends_in('j') ? "obj" : ends_in('l') ? "stl" : "bvh";
 }
 
 void set_up(Assimp::Importer& importer) {

@@ -13,7 +13,10 @@ Scene read_scene(const std::string& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
   if (extension == ".gltf" || extension == ".glb") return read_gltf(path);
-  if (extension == ".fbx" || extension == ".dae" || extension == ".bvh") return read_with_assimp(path);
+  if (extension == ".fbx" || extension == ".dae" || extension == ".bvh" || extension == ".obj" ||
+      extension == ".stl") {
+    return read_with_assimp(path);
+  }
   throw Error(path, "file name", "'" + extension + "' is no known kind of clip file",
               "Give a file that ends in .fbx, .glb, .gltf, .dae or .bvh");
 }

@@ -6,7 +6,8 @@
 
 namespace hydrostat::io {
 
-/// Reads a clip file by its extension, in this very process: .fbx, .dae and .bvh with assimp, .gltf and .glb with tinygltf.
+/// Reads a clip file by its extension, in this very process: .fbx, .dae and .bvh with assimp, .gltf and .glb with tinygltf;
+/// .obj and .stl too, which hold a mesh alone.
 /// A hostile file can end the process or hang it; read_in_worker() is the safe way. Throws Error.
 Scene read_scene(const std::string& path);
 

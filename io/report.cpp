@@ -129,6 +129,36 @@ void fill(Group& group, const retarget::ReplayReport& replay) {
   group.add("clip_apex_rise_length", replay.clip_apex_rise_length);
 }
 
+void fill(Group& group, const retarget::SimulationReport& simulation) {
+  group.add("dimension", simulation.dimension);
+  group.add("duration_s", simulation.duration_s);
+  group.add("diverged", simulation.diverged);
+  if (simulation.diverged) {
+    group.add("diverged_time_s", simulation.diverged_time_s);
+    group.add("diverged_cause", simulation.diverged_cause);
+  } else {
+    group.add_nothing("diverged_time_s");
+    group.add_nothing("diverged_cause");
+  }
+  group.add("energy_start_mgl", simulation.energy_start_mgl);
+  group.add("energy_end_mgl", simulation.energy_end_mgl);
+  group.add("work_mgl", simulation.work_mgl);
+  group.add("energy_excess_mgl", simulation.energy_excess_mgl);
+  group.add("momentum_residual_mg", simulation.momentum_residual_mg);
+  group.add("angular_residual_mgl", simulation.angular_residual_mgl);
+  group.add("external_assist_mg", simulation.external_assist_mg);
+  group.add("volume_error_max", simulation.volume_error_max);
+  group.add("volume_error_end", simulation.volume_error_end);
+  group.add("penetration_max_size", simulation.penetration_max_size);
+  group.add("inverted_elements", simulation.inverted_elements);
+  group.add("inverted_elements_end", simulation.inverted_elements_end);
+  group.add("travel_length", simulation.travel_length);
+  group.add("speed_max_m_s", simulation.speed_max_m_s);
+  group.add("speed_end_m_s", simulation.speed_end_m_s);
+  group.add("ms_per_sim_s", simulation.ms_per_sim_s);
+  group.add("real_time_factor", simulation.real_time_factor);
+}
+
 void fill(Group& group, const retarget::EffectReport& effect) {
   group.add("name", effect.name);
   group.add("state", effect.state);
@@ -173,13 +203,17 @@ std::string report_json(const retarget::RunReport& report) {
   json["outcome_ok"] = report.outcome_ok;
   json["source"] = group_json("source", report.source, warnings);
   json["body"] = group_json("body", report.body, warnings);
-  json["coupling"] = group_json("coupling", report.coupling, warnings);
-  json["preparation"] = group_json("preparation", report.preparation, warnings);
-  json["inverse"] = group_json("inverse", report.inverse, warnings);
-  json["signals"] = group_json("signals", report.signals, warnings);
-  json["replay"]["naive"] = replay_json("naive", report.naive, warnings);
-  json["replay"]["open_loop"] = replay_json("open_loop", report.open_loop, warnings);
-  json["replay"]["closed_loop"] = replay_json("closed_loop", report.closed_loop, warnings);
+  if (report.simulation) {
+    json["simulation"] = group_json("simulation", *report.simulation, warnings);
+  } else {
+    json["coupling"] = group_json("coupling", report.coupling, warnings);
+    json["preparation"] = group_json("preparation", report.preparation, warnings);
+    json["inverse"] = group_json("inverse", report.inverse, warnings);
+    json["signals"] = group_json("signals", report.signals, warnings);
+    json["replay"]["naive"] = replay_json("naive", report.naive, warnings);
+    json["replay"]["open_loop"] = replay_json("open_loop", report.open_loop, warnings);
+    json["replay"]["closed_loop"] = replay_json("closed_loop", report.closed_loop, warnings);
+  }
   json["effects"] = Json::array();
   for (const retarget::EffectReport& effect : report.effects) {
     json["effects"].push_back(group_json("effects." + effect.name, effect, warnings));

@@ -126,10 +126,22 @@ Json contact_json(const PageContactRow& row) {
       {"patch", row.patch}, {"role", role_name(row.role)}, {"rate_hz", row.rate_hz}, {"loop", row.loop}, {"states", states}};
 }
 
+Json obstacle_json(const PageObstacle& obstacle) {
+  return {{"vertices", packed_as<float>(obstacle.vertices)},
+          {"triangles", packed_as<std::uint32_t>(obstacle.triangles)},
+          {"is_endless", obstacle.is_endless},
+          {"rate_hz", obstacle.travel.rate_hz},
+          {"travel", packed_as<float>(obstacle.travel.frames)}};
+}
+
 Json page_json(const PageInput& input) {
   Json json;
   json["report"] = Json::parse(report_json(input.report));
   json["ground_height"] = input.ground_height;
+  json["has_ground"] = input.has_ground;
+  json["ground_normal"] = {input.ground_normal.x(), input.ground_normal.y(), input.ground_normal.z()};
+  json["obstacles"] = Json::array();
+  for (const PageObstacle& obstacle : input.obstacles) json["obstacles"].push_back(obstacle_json(obstacle));
   json["skin"] = {{"triangles", packed_as<std::uint32_t>(input.skin.triangles)},
                   {"nodes", packed_as<std::uint32_t>(input.embedding.nodes)},
                   {"weights", packed_as<float>(input.embedding.weights)}};

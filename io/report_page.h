@@ -46,6 +46,14 @@ struct PageContactRow {
   std::vector<retarget::ContactState> states;
 };
 
+/// Something that stands in the body's way.
+struct PageObstacle {
+  Eigen::Matrix3Xd vertices;   // [m] 3 x V at the start
+  Eigen::Matrix3Xi triangles;  // 3 x T
+  retarget::Motion travel;     // 3 x F, from there
+  bool is_endless = false;     // a piece of a half space's rim
+};
+
 struct PageInput {
   const retarget::RunReport& report;
   const retarget::SkinnedMesh& skin;
@@ -54,7 +62,10 @@ struct PageInput {
   std::vector<PageMotion> motions;  // at most one of each role; clip, target and replay are shown at the start
   std::vector<PageChart> charts;
   std::vector<PageContactRow> contacts;
-  double ground_height = 0;  // [m]
+  double ground_height = 0;  // [m] where x and z are 0
+  bool has_ground = true;
+  Eigen::Vector3d ground_normal = Eigen::Vector3d::UnitY();
+  std::vector<PageObstacle> obstacles = {};
 };
 
 /// Writes one HTML file that needs nothing else, no network either: the view of the motions, the charts, the contact

@@ -34,7 +34,7 @@ void write_arrays(const fs::path& folder, const retarget::Trace& trace) {
   write_array(folder / "activation.npy", {steps, edges}, trace.activation);
   write_array(folder / "edges.npy", {edges, 2}, trace.edges);
   write_array(folder / "rest_length.npy", {edges}, trace.rest_length_m);
-  write_array(folder / "elements.npy", {static_cast<std::size_t>(trace.elements.cols()), 4}, trace.elements);
+  write_array(folder / "elements.npy", {static_cast<std::size_t>(trace.elements.cols()), static_cast<std::size_t>(trace.elements.rows())}, trace.elements);
 }
 
 void refuse_other_things(const fs::path& folder) {

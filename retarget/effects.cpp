@@ -3,45 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 
 #include "physics/elastic_forces.h"
+#include "retarget/cpu_seconds.h"
 
 namespace hydrostat::retarget {
 namespace {
 
-constexpr int kTimings = 5;             // the median counts
-constexpr double kPassSeconds = 0.003;  // of one timing, at least
 constexpr int kContactSteps = 24;       // of one timing of the ground
 constexpr double kFramesPerSecond = 60;  // at which the skin is asked for
-
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-double median(std::array<double, kTimings> values) {
-  std::sort(values.begin(), values.end());
-  return values[kTimings / 2];
-}
-
-/// Seconds of one call.
-template <typename Work>
-double seconds_of(const Work& work) {
-  std::array<double, kTimings> all;
-  for (double& seconds : all) {
-    const double began = thread_seconds();
-    long calls = 0;
-    do {
-      work();
-      ++calls;
-      seconds = thread_seconds() - began;
-    } while (seconds < kPassSeconds);
-    seconds /= static_cast<double>(calls);
-  }
-  return median(all);
-}
 
 physics::Body without_volume(const physics::Body& body) {
   physics::Body springs = body;

@@ -2,21 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <optional>
 
+#include "retarget/cpu_seconds.h"
 #include "retarget/fall.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 
 namespace hydrostat::retarget {
 namespace {
-
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// The velocity [m/s] that all pushes together give between two times: each counts with the share of its duration that lies
 /// there.

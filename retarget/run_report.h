@@ -57,6 +57,24 @@ struct ReplayReport {
   double apex_rise_length = 0, clip_apex_rise_length = 0;  // of the COM over its height at the start, per L
 };
 
+/// A scene's simulation, without a clip. Energies are per m g L with g = 9.81 m/s2.
+struct SimulationReport {
+  int dimension = 3;
+  double duration_s = 0;
+  bool diverged = false;
+  double diverged_time_s = 0;
+  std::string diverged_cause;
+  double energy_start_mgl = 0, energy_end_mgl = 0;  // kinetic, elastic and in the field of gravity
+  double work_mgl = 0;                              // by activations, pushes and moving obstacles
+  double energy_excess_mgl = 0;                     // the most by which energy exceeded its start and the work
+  double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
+  double volume_error_max = 0, volume_error_end = 0, penetration_max_size = 0;
+  int inverted_elements = 0, inverted_elements_end = 0;  // the most in any step; at the end
+  double travel_length = 0;  // of the COM over the ground's plane
+  double speed_max_m_s = 0, speed_end_m_s = 0;  // of the fastest node
+  double ms_per_sim_s = 0, real_time_factor = 0;
+};
+
 struct EffectReport {
   std::string name, state, reason;  // state: "on" or "off"
   double ms_per_sim_s = 0;
@@ -75,6 +93,7 @@ struct RunReport {
   InverseReport inverse;
   SignalsReport signals;
   std::optional<ReplayReport> naive, open_loop, closed_loop;
+  std::optional<SimulationReport> simulation;  // in place of all that tells of a clip
   std::vector<EffectReport> effects;
   AccuracyReport accuracy;
   std::vector<std::pair<std::string, double>> timing_s;  // per stage, in order

@@ -15,13 +15,15 @@ Matrix interval_means(const Matrix& rows, Eigen::Index every) {
 
 }  // namespace
 
-Trace empty_trace(const physics::Body& body, Eigen::Index rows) {
+template <int Dim>
+Trace empty_trace(const physics::BodyOf<Dim>& body, Eigen::Index rows) {
+  const Eigen::Index entries = 3 * body.node_count();
   Trace trace;
   trace.time_s.resize(rows);
   trace.mass_kg = body.mass;
-  trace.position.resize(body.rest.size(), rows);
+  trace.position.resize(entries, rows);
   trace.velocity = trace.position;
-  trace.contact_force = Eigen::MatrixXd::Zero(body.rest.size(), rows);
+  trace.contact_force = Eigen::MatrixXd::Zero(entries, rows);
   trace.effect_force = trace.correction_impulse = trace.contact_force;
   trace.contact_moment = Eigen::Matrix3Xd::Zero(3, rows);
   trace.effect_moment = trace.contact_moment;
@@ -31,6 +33,8 @@ Trace empty_trace(const physics::Body& body, Eigen::Index rows) {
   trace.elements = body.tets;
   return trace;
 }
+template Trace empty_trace<2>(const physics::BodyOf<2>&, Eigen::Index);
+template Trace empty_trace<3>(const physics::BodyOf<3>&, Eigen::Index);
 
 void shorten(Trace& trace, Eigen::Index rows) {
   trace.time_s.conservativeResize(rows);

@@ -8,7 +8,7 @@ namespace hydrostat::retarget {
 
 /// A free simulation written down for an audit: column s of every time course is one row of the trace. Forces and moments are
 /// means over the row's interval, which ends at time_s[s]; row 0 is the start, forces zero. S rows, N nodes, E edges; column s
-/// of a 3N x S array holds x0 y0 z0 x1 y1 z1 ...
+/// of a 3N x S array holds x0 y0 z0 x1 y1 z1 ..., z = 0 in 2D.
 struct Trace {
   Eigen::VectorXd time_s;                // S
   Eigen::VectorXd mass_kg;               // N
@@ -22,13 +22,14 @@ struct Trace {
   Eigen::MatrixXd activation;            // [-] E x S
   Eigen::Matrix2Xi edges;                // 2 x E
   Eigen::VectorXd rest_length_m;         // E
-  Eigen::Matrix4Xi elements;             // 4 x T
+  Eigen::MatrixXi elements;              // 4 x T tets or 3 x T triangles
 
   Eigen::Index count() const { return time_s.size(); }
 };
 
 /// A trace of a body with room for `rows` rows, forces and moments zero.
-Trace empty_trace(const physics::Body& body, Eigen::Index rows);
+template <int Dim>
+Trace empty_trace(const physics::BodyOf<Dim>& body, Eigen::Index rows);
 
 /// Cuts off what comes after the first `rows` rows.
 void shorten(Trace& trace, Eigen::Index rows);

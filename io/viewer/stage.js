@@ -47,6 +47,20 @@ function heading_of(motion, length) {
   return width_along(positions, [1, 0]) >= width_along(positions, [0, 1]) ? [1, 0] : [0, 1];
 }
 
+/** The box that a motion fills in all its time. */
+function box_of_motion(motion) {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  for (let k = 0; k <= 60; ++k) {
+    const positions = motion.at((k / 60) * motion.duration_s);
+    for (let i = 0; i < positions.length; ++i) {
+      low[i % 3] = Math.min(low[i % 3], positions[i]);
+      high[i % 3] = Math.max(high[i % 3], positions[i]);
+    }
+  }
+  return { centre: low.map((least, d) => 0.5 * (least + high[d])), size: Math.hypot(...low.map((least, d) => high[d] - least)) };
+}
+
 /** A floor with lines every `step` metres and finer ones every tenth, drawn in its shader: lines of geometry would fight its depth. */
 function grid_material(step, lines) {
   const material = new MeshLambertMaterial();
@@ -82,10 +96,17 @@ export class Stage {
     this.edges = indices(page.body.edges);
     this.rest = floats(page.body.nodes);
     this.length = page.report.body.length_m || 1;
+    this.ground_normal = new Vector3(...page.ground_normal);
+    this.ground_height = page.ground_height;
+    this.is_scene = !!page.report.simulation;
+    this.is_flat = page.report.simulation?.dimension === 2;
+    const box = page.report.simulation ? box_of_motion(page.motions[0]) : null;
+    // A scene that fits into the view is seen as a whole; otherwise the view goes with the body, as it does with a creature.
+    this.whole = box && box.size < 10 * this.length ? box : null;
+    if (this.whole) this.length = Math.max(this.length, 0.5 * box.size);
     this.view = 'overlay';
     this.follows = true;
     this.shows_mesh = false;
-    this.ground_height = page.ground_height;
 
     this.renderer = new WebGLRenderer({ canvas, antialias: true });
     this.renderer.shadowMap.enabled = true;
@@ -97,7 +118,8 @@ export class Stage {
     this.controls.addEventListener('change', () => this.draw());
 
     this.add_lights();
-    this.add_ground();
+    this.add_ground(page);
+    this.obstacles = page.obstacles.map((obstacle) => this.add_obstacle(obstacle));
     this.bodies = page.motions.filter((motion) => kRoles[motion.role]).map((motion) => this.add_body(motion));
     this.leader = (this.bodies.find((body) => body.motion.role === 'replay') ?? this.bodies[0])?.motion;
     this.add_control_mesh();
@@ -116,12 +138,13 @@ export class Stage {
     this.scene.add(this.sun, this.sun.target);
   }
 
-  add_ground() {
+  add_ground(page) {
     this.grid_step = 10 ** Math.round(Math.log10(this.length));
     this.line_colour = new Color();
     const extent = 120 * this.length;
     this.floor = new Mesh(new PlaneGeometry(extent, extent), grid_material(this.grid_step, this.line_colour));
-    this.floor.rotation.x = -Math.PI / 2;
+    this.floor.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), this.ground_normal);
+    this.floor.visible = page.has_ground;
     this.floor.receiveShadow = true;
     this.scene.add(this.floor);
   }
@@ -130,11 +153,36 @@ export class Stage {
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(new Float32Array((this.skin.nodes.length / 4) * 3), 3));
     geometry.setIndex(new BufferAttribute(this.triangles, 1));
-    const material = new MeshStandardMaterial({ color: kRoles[motion.role].colour, roughness: 0.75, side: DoubleSide });
+    const material = new MeshStandardMaterial({
+      color: kRoles[motion.role].colour, roughness: 0.75, side: DoubleSide, flatShading: this.is_scene,
+    });
     const mesh = new Mesh(geometry, material);
     mesh.frustumCulled = false;
     this.scene.add(mesh);
     return { motion, mesh, visible: ['clip', 'target', 'replay'].includes(motion.role) };
+  }
+
+  add_obstacle(told) {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(floats(told.vertices), 3));
+    geometry.setIndex(new BufferAttribute(indices(told.triangles), 1));
+    const material = new MeshStandardMaterial({ color: 0x8d949c, roughness: 0.9, side: DoubleSide, flatShading: true });
+    const mesh = new Mesh(geometry, material);
+    // An endless plate is drawn as glass, or it would hide what it presses on.
+    Object.assign(material, told.is_endless ? { transparent: true, opacity: 0.25, depthWrite: false } : {});
+    mesh.castShadow = mesh.receiveShadow = !told.is_endless;
+    this.scene.add(mesh);
+    return { mesh, rate_hz: told.rate_hz, travel: floats(told.travel) };
+  }
+
+  move_obstacles(t) {
+    for (const { mesh, rate_hz, travel } of this.obstacles) {
+      const last = travel.length / 3 - 1;
+      const place = Math.min(Math.max(0, t * rate_hz), last);
+      const [from, to] = [Math.floor(place), Math.min(Math.floor(place) + 1, last)];
+      const along = (d) => travel[3 * from + d] + (place - from) * (travel[3 * to + d] - travel[3 * from + d]);
+      mesh.position.set(along(0), along(1), along(2));
+    }
   }
 
   /** The replay's springs, coloured by their stretch. */
@@ -148,14 +196,16 @@ export class Stage {
   }
 
   place_camera() {
-    const [hx, hz] = heading_of(this.leader, this.length);
+    const [hx, hz] = this.is_flat ? [1, 0] : heading_of(this.leader, this.length);
     this.aside = [-hz, hx];
     const positions = this.bodies.map((body) => body.motion).find((motion) => motion.of_skin)?.at(0) ?? this.leader.at(0);
     this.spacing = width_along(positions, this.aside) + 0.35 * this.length;
     const start = centre(this.leader.at(0));
     this.focus = new Vector3(start[0], 0.5 * (start[1] + this.ground_height), start[2]);
+    if (this.is_scene) this.focus.set(...(this.whole?.centre ?? start));
     this.controls.target.copy(this.focus);
     this.camera_way = new Vector3(0.45 * hx - hz, 0.42, 0.45 * hz + hx).normalize();
+    if (this.is_flat) this.camera_way.set(0.12, 0.16, 1).normalize();
     this.set_distance();
   }
 
@@ -201,6 +251,7 @@ export class Stage {
       this.move_skin(body, t);
     }
     this.move_springs(t);
+    this.move_obstacles(t);
     this.follow(t);
     this.draw();
   }
@@ -253,8 +304,9 @@ export class Stage {
   /** Camera, light and floor go with the replay; the floor's grid stays in the world. */
   follow(t) {
     if (!this.leader) return;
-    const [x, , z] = centre(this.leader.at(t));
-    const move = new Vector3(x - this.focus.x, 0, z - this.focus.z);
+    const [x, y, z] = centre(this.leader.at(t));
+    const climb = this.is_scene ? y - this.focus.y : 0;
+    const move = this.whole ? new Vector3() : new Vector3(x - this.focus.x, climb, z - this.focus.z);
     this.focus.add(move);
     if (this.follows) {
       this.controls.target.add(move);
@@ -262,9 +314,13 @@ export class Stage {
       this.camera.lookAt(this.controls.target);
     }
     const seen = this.controls.target;
-    this.floor.position.set(seen.x, this.ground_height, seen.z);
+    this.floor.position.set(seen.x, this.floor_height(seen.x, seen.z), seen.z);
     this.sun.target.position.copy(seen);
     this.sun.position.copy(seen).add(new Vector3(1.2, 4, 1.6).multiplyScalar(this.length));
+  }
+
+  floor_height(x, z) {
+    return this.ground_height - (this.ground_normal.x * x + this.ground_normal.z * z) / this.ground_normal.y;
   }
 
   draw() {

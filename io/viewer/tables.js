@@ -2,10 +2,10 @@
 
 const kUnits = [
   ['_rms_length', 100, '% L'], ['_per_cycle_length', 100, '% L'], ['_length', 100, '% L'], ['_max_size', 100, '% D'], ['_size', 100, '% D'],
-  ['_l0', 100, '% l0'], ['_mgl', 1, 'mgL'], ['_mg', 1, 'mg'], ['_deg_per_cycle', 1, 'deg'], ['_kg', 1, 'kg'], ['_pa', 1, 'Pa'],
+  ['_l0', 100, '% l0'], ['_mgl', 1, 'mgL'], ['_mg', 1, 'mg'], ['_deg_per_cycle', 1, 'deg'], ['_m_s', 1, 'm/s'], ['_kg', 1, 'kg'], ['_pa', 1, 'Pa'],
   ['_hz', 1, 'Hz'], ['_ms_per_sim_s', 1, 'ms/s'], ['_time_factor', 1, '×'], ['_m', 1, 'm'], ['_s', 1, 's'],
 ];
-const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_rms', 'correction_rms']);
+const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_end', 'volume_error_rms', 'correction_rms']);
 const kNames = {
   clip_shape_rms_length: 'shape against the imported clip', shape_rms_length: 'shape against the target',
   world_rms_length: 'position against the target', drift_per_cycle_length: 'drift a cycle', heading_deg_per_cycle: 'heading a cycle',
@@ -14,7 +14,11 @@ const kNames = {
   momentum_residual_mg: 'momentum unaccounted for', angular_residual_mgl: 'angular momentum unaccounted for',
   external_assist_mg: 'assist from outside', correction_rms: 'correction', real_time_factor: 'speed over real time', duration_s: 'duration',
   fell: 'fell', fall_time_s: 'time of the fall', fall_cause: 'cause of the fall', apex_rise_length: 'highest rise of the COM',
-  clip_apex_rise_length: 'highest rise in the clip',
+  clip_apex_rise_length: 'highest rise in the clip', diverged_time_s: 'time at which it diverged', diverged_cause: 'what was seen then',
+  energy_start_mgl: 'energy at the start', energy_end_mgl: 'energy at the end', work_mgl: 'work done on the body',
+  energy_excess_mgl: 'energy beyond start and work, greatest', volume_error_end: 'volume error at the end',
+  travel_length: 'travel of the COM', ms_per_sim_s: 'computing for a second',
+  inverted_elements: 'inverted elements, most', inverted_elements_end: 'inverted elements at the end',
 };
 
 function element(parent, tag, name, text) {
@@ -58,6 +62,7 @@ function section(parent, title) {
 
 /** Naive, open loop and closed loop side by side. */
 function add_metrics(parent, replay) {
+  if (!replay) return;
   const runs = [['naive', 'naive'], ['open_loop', 'open loop'], ['closed_loop', 'closed loop']];
   const keys = Object.keys(replay.closed_loop ?? replay.open_loop ?? replay.naive ?? {});
   if (keys.length === 0) return;
@@ -96,6 +101,7 @@ function add_effects(parent, effects) {
 function add_group(parent, title, group) {
   const table = element(section(parent, title), 'table');
   for (const [key, value] of Object.entries(group)) {
+    if (value === undefined || (value === null && key.startsWith('diverged_'))) continue;
     const row = element(table, 'tr');
     element(row, 'th', '', name_of(key)).title = key;
     const cell = element(row, 'td', '', text_of(key, value));
@@ -122,19 +128,23 @@ export function add_tables(parent, report) {
     for (const warning of report.warnings) element(list, 'li', '', warning);
   }
   add_metrics(main, report.replay);
+  if (report.simulation) add_group(main, 'The simulation', report.simulation);
   add_effects(main, report.effects);
   add_timing(main, report.timing_s);
   const groups = [
     ['Preparation of the target', report.preparation], ['Inverse dynamics', report.inverse], ['Signals', report.signals],
-    ['Body', { ...report.body, coupling_error_rms_length: report.coupling.error_rms_length }], ['Accuracy', report.accuracy],
+    ['Body', { ...report.body, coupling_error_rms_length: report.coupling?.error_rms_length }], ['Accuracy', report.accuracy],
     ['Source', report.source],
   ];
-  for (const [title, group] of groups) add_group(details, title, group);
+  for (const [title, group] of groups) {
+    if (group) add_group(details, title, group);
+  }
 }
 
 /** What to say above everything: null when the run did what was asked. */
 export function verdict(report) {
-  const run = report.replay.closed_loop;
+  if (report.simulation?.diverged) return `The simulation diverged: ${report.simulation.diverged_cause}.`;
+  const run = report.replay?.closed_loop;
   if (run?.fell) return `The replay fell at ${text_of('_s', run.fall_time_s)}: ${run.fall_cause || 'no cause was found'}.`;
   if (!report.outcome_ok) return 'The outcome is short of what was asked: see the warnings below.';
   return null;

@@ -30,7 +30,7 @@ document.body.insertAdjacentHTML('beforeend', `
       </div>
       <div id="switches">
         <span class="group" id="shown"></span>
-        <span class="group">
+        <span class="group" id="arrangement">
           <label><input type="radio" name="view" value="overlay" checked>overlaid</label>
           <label><input type="radio" name="view" value="side">side by side</label>
         </span>
@@ -51,11 +51,12 @@ const end = longest(page.motions.filter((motion) => motion.role === 'replay')) |
 const state = { t: 0, playing: false, speed: 1 };
 
 function say_what_this_is() {
-  const name = report.source.clip || 'motion';
+  const file = report.source.file.split('/').pop();
+  const name = report.source.clip || (report.simulation && file.replace(/\.toml$/, '').replaceAll('_', ' ')) || 'motion';
   document.title = `${name} – hydrostat`;
   document.querySelector('h1').textContent = name;
   find('subtitle').textContent =
-    [report.source.file, `${report.body.nodes} nodes`, report.signals.kind.replaceAll('_', ' '), report.accuracy.method].filter(Boolean).join(' · ');
+    [report.source.file, `${report.body.nodes} nodes`, report.signals?.kind.replaceAll('_', ' '), report.accuracy.method].filter(Boolean).join(' · ');
   const trouble = verdict(report);
   find('banner').hidden = trouble === null;
   find('banner').textContent = trouble ?? '';
@@ -128,6 +129,13 @@ function add_body_switches() {
   }
 }
 
+/** What there is but one of needs no arrangement. */
+function hide_what_has_no_use() {
+  const hide = (element) => element.style.setProperty('display', 'none');
+  if (page.motions.length < 2) hide(find('arrangement'));
+  if (stage?.whole) hide(find('follow').parentElement);
+}
+
 function resize() {
   stage?.resize();
   for (const chart of charts) chart.resize();
@@ -148,7 +156,7 @@ function read_address() {
 }
 
 find('scrub').max = end;
-if (stage) find('scale').textContent = `grid ${stage.grid_step} m and ${stage.grid_step / 10} m`;
+if (stage) find('scale').textContent = !page.has_ground ? '' : `grid ${stage.grid_step} m and ${stage.grid_step / 10} m`;
 find('scrub').oninput = () => {
   set_playing(false);
   set_time(Number(find('scrub').value));
@@ -182,6 +190,7 @@ document.addEventListener('keydown', (event) => {
 window.addEventListener('hashchange', read_address);
 
 add_body_switches();
+hide_what_has_no_use();
 set_theme(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 resize();
 if (stage) set_view('overlay');

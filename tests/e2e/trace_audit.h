@@ -90,14 +90,14 @@ inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::fil
     Eigen::VectorXd height = Eigen::VectorXd::Constant(nodes, 1e300);  // of the lowest point that hangs on a node
     for (std::size_t p = 0; p < point_nodes.size(); ++p) {
       double start = 0, end = 0, way = 0;
-      for (std::size_t k = 0; k < 4; ++k) {
+      for (std::size_t k = 0; k < point_nodes[p].size(); ++k) {
         const Eigen::Index i = point_nodes[p][k];
         const double share = point_weights[p][k];
         start += share * x0(1, i);
         end += share * x1(1, i);
         way += share * dt * std::max(std::abs(v0(1, i)), std::abs(v1(1, i)));
       }
-      for (std::size_t k = 0; k < 4; ++k) {
+      for (std::size_t k = 0; k < point_nodes[p].size(); ++k) {
         const Eigen::Index i = point_nodes[p][k];
         if (point_weights[p][k] > 0) height[i] = std::min(height[i], std::min(start, end) - way);
       }

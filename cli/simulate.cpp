@@ -1,0 +1,201 @@
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "cli/command_line.h"
+#include "cli/number_option.h"
+#include "cli/stages.h"
+#include "io/creature_directory.h"
+#include "io/creature_record.h"
+#include "io/report.h"
+#include "io/simulation_files.h"
+#include "io/trace_writer.h"
+
+namespace hydrostat::cli {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kCommand = "hydrostat simulate";
+constexpr double kLongest = 3600;        // [s]
+constexpr double kLargestTrace = 4e9;    // [bytes]
+
+struct SimulateCommand {
+  std::string scene, out, method, trace;
+  double duration = 0, trace_rate = 0;
+  unsigned seed = 0;
+  bool seed_is_given = false, json = false, quiet = false;
+  int threads = 1;
+};
+
+/// How many steps a row of the trace spans.
+int steps_per_row(const SimulateCommand& command, double dt_s) {
+  if (command.trace_rate == 0) return 1;
+  const double every = 1 / (dt_s * command.trace_rate);
+  if (every < 1 - 1e-9 || std::abs(every - std::round(every)) > 1e-6 * every) {
+    char text[120];
+    std::snprintf(text, sizeof text, "%g Hz is not a whole part of the %g Hz at which the scene is stepped", command.trace_rate, 1 / dt_s);
+    throw UsageError(kCommand, "option --trace-rate", text, "Give a whole part of it.");
+  }
+  return static_cast<int>(std::lround(every));
+}
+
+retarget::SimulationOptions options_of(const SimulateCommand& command, const io::SceneFile& scene) {
+  retarget::SimulationOptions options;
+  options.method = scene.method;
+  options.dt_s = scene.dt_s;
+  options.duration_s = scene.duration_s;
+  options.trace = !command.trace.empty();
+  options.steps_per_row = steps_per_row(command, scene.dt_s);
+  return options;
+}
+
+/// What command line and scene file say together.
+io::SceneFile read_scene(const SimulateCommand& command) {
+  io::SceneFile scene = io::read_scene_file(command.scene, command.seed_is_given ? std::optional(command.seed) : std::nullopt);
+  if (const std::optional<physics::Method> method = io::method_named(command.method)) scene.method = *method;
+  if (command.duration > 0) scene.duration_s = command.duration;
+  return scene;
+}
+
+void refuse_large_trace(const SimulateCommand& command, const retarget::SimulationOptions& options, Eigen::Index nodes, Eigen::Index edges) {
+  if (!options.trace) return;
+  const double rows = options.duration_s / (options.dt_s * options.steps_per_row);
+  if (rows * 8 * static_cast<double>(15 * nodes + edges) <= kLargestTrace) return;
+  throw UsageError(kCommand, "option --trace", "the trace would take more than 4 GB of memory",
+                   command.trace_rate > 0 ? "Give a smaller --trace-rate or --duration." : "Give a --trace-rate.");
+}
+
+template <int Dim>
+void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& scenario, const retarget::SimulationOptions& options,
+                 retarget::RunReport& report) {
+  const physics::BodyOf<Dim>& body = scenario.scene.body;
+  report.source.file = scene.file;
+  report.source.sha256 = scene.sha256;
+  report.source.duration_s = options.duration_s;
+  report.source.rate_hz = 1 / options.dt_s;
+  report.source.root_motion = "none";
+  report.body.nodes = body.node_count();
+  report.body.elements = body.tet_count();
+  report.body.constraints = body.edge_count();
+  report.body.vertices = scenario.scene.contact_points.count();
+  report.body.mass_kg = body.mass.sum();
+  report.body.length_m = scenario.length;
+  report.body.size_m = scenario.size;
+  report.body.youngs_modulus_pa = scenario.youngs_modulus;
+  report.body.pieces = 1;
+  report.effects = retarget::effects_of(scenario, options);
+  report.accuracy.method = physics::name_of(options.method);
+  report.accuracy.element = scene.element;
+  report.accuracy.dt_s = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
+  report.accuracy.estimated_error_length = retarget::substep_error(scenario, options);
+}
+
+io::CreatureRecord record_of(const io::SceneFile& scene, const retarget::RunReport& report) {
+  io::CreatureRecord record;
+  record.source_file = scene.file;
+  record.source_sha256 = scene.sha256;
+  record.settings = {{"kind", std::string("scene")},
+                     {"method", physics::name_of(scene.method)},
+                     {"dt_s", scene.dt_s},
+                     {"duration_s", scene.duration_s},
+                     {"seed", static_cast<std::int64_t>(scene.seed)}};
+  for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
+  return record;
+}
+
+void write_files(io::CreatureWriter& writer, const io::SceneFile& scene, const retarget::Simulation& simulation,
+                 const retarget::RunReport& report) {
+  const bool diverged = simulation.report.diverged;
+  writer.write("creature.toml", io::to_toml(record_of(scene, report)));
+  writer.write("body.json", io::scene_body_text(scene));
+  writer.write("report.json", io::report_json(report));
+  io::write_simulation_glb(writer.directory() / (diverged ? "failed.glb" : "replay.glb"), scene, simulation);
+  io::write_simulation_page(writer.directory() / "report.html", scene, simulation, report);
+}
+
+std::string summary(const retarget::RunReport& report, const std::string& where) {
+  const retarget::SimulationReport& run = *report.simulation;
+  char text[300];
+  std::snprintf(text, sizeof text,
+                ": %.3g s of %d nodes by '%s'; travel %.3f L, volume error %.2f %% at most, penetration %.2f %% D, %d inverted elements; "
+                "%.1fx real time",
+                run.duration_s, report.body.nodes, report.accuracy.method.c_str(), run.travel_length, 100 * run.volume_error_max,
+                100 * run.penetration_max_size, run.inverted_elements, run.real_time_factor);
+  return where + text;
+}
+
+int tell(const SimulateCommand& command, const retarget::RunReport& report) {
+  const retarget::SimulationReport& run = *report.simulation;
+  if (command.json) std::cout << io::report_json(report);
+  if (run.diverged) {
+    std::cerr << one_line({command.scene, "simulation", "it diverged: " + run.diverged_cause,
+                           (fs::path(command.out) / "failed.glb").string() + " shows it; try --method euler, a smaller dt_s or a softer body"})
+              << std::endl;
+    return kShortOfTarget;
+  }
+  if (!command.json) std::cout << summary(report, command.out) << "\n";
+  return kDone;
+}
+
+int simulate(const SimulateCommand& command) {
+  Progress progress(std::cerr, progress_style(command.quiet));
+  Stages stages(progress);
+  const io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
+  const retarget::SimulationOptions options = options_of(command, scene);
+  io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
+  retarget::RunReport report;
+  const retarget::Simulation simulation = std::visit(
+      [&](const auto& scenario) {
+        const auto& body = scenario.scene.body;
+        refuse_large_trace(command, options, body.node_count(), body.edge_count());
+        retarget::Simulation run = stages.run("simulation", [&] { return retarget::simulate(scenario, options); });
+        stages.run("measurement", [&] {
+          fill_report(scene, scenario, options, report);
+          return 0;
+        });
+        return run;
+      },
+      scene.scenario);
+  report.simulation = simulation.report;
+  report.outcome_ok = !simulation.report.diverged;
+  report.warnings = scene.warnings;
+  report.timing_s = stages.timing_s;
+  try {
+    write_files(writer, scene, simulation, report);
+  } catch (const Error& error) {
+    throw writer.as_seen(error);
+  }
+  if (!command.trace.empty()) io::write_trace(command.trace, simulation.trace);
+  writer.commit();
+  return tell(command, report);
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app, int& exit_code) {
+  const auto command = std::make_shared<SimulateCommand>();
+  CLI::App* sub = app.add_subcommand("simulate", "Simulate a scene without a clip: shapes, materials, obstacles, signals");
+  sub->add_option("SCENE", command->scene, "TOML file (README, 'Scene files')")->required();
+  sub->add_option("-o,--out", command->out, "Directory for motion, report and page; replaced as a whole")->required();
+  sub->add_option("--method", command->method, "Time integration [the scene's]")->check(CLI::IsMember(io::method_names()));
+  sub->add_option("--duration", command->duration, "Seconds to simulate [the scene's]")->check(number_within(1e-3, kLongest));
+  CLI::Option* seed = sub->add_option("--seed", command->seed, "Of a random start [the scene's]");
+  CLI::Option* trace = sub->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
+  sub->add_option("--trace-rate", command->trace_rate, "Rows a second, a whole part of the scene's steps a second [all steps]")
+      ->check(number_within(0.01, 1e6))
+      ->needs(trace);
+  sub->add_option("--threads", command->threads, "At most so many; the outcome does not hang on it")->check(number_within(1, 256));
+  sub->add_flag("--json", command->json, "Print the report as JSON");
+  sub->add_flag("--quiet", command->quiet, "No progress");
+  sub->callback([command, seed, &exit_code] {
+    command->seed_is_given = seed->count() > 0;
+    exit_code = simulate(*command);
+  });
+}
+
+}  // namespace hydrostat::cli

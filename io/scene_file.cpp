@@ -1,0 +1,277 @@
+#include "io/scene_file.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/fingerprint.h"
+#include "io/scene_shapes.h"
+#include "io/toml_reader.h"
+
+namespace hydrostat::io {
+namespace {
+
+using physics::PointsOf;
+using physics::VectorOf;
+using retarget::ScenarioOf;
+using retarget::StartShape;
+
+constexpr double kSteepest = 80;             // [deg] of the ground
+constexpr double kMostActivation = 0.95;     // of all waves on one constraint: 1 would let it vanish
+constexpr double kLeastPoissonsRatio = 0.25; // of springs
+constexpr double kFriction = 0.8;
+constexpr Within kFrictionRange{.least = 0, .most = 10};
+
+/// Reads the tables of one scene into a scenario.
+template <int Dim>
+class SceneReader {
+ public:
+  SceneReader(const TomlReader& root, SceneFile& scene) : root_(root), scene_(scene) {}
+
+  ScenarioOf<Dim> read() {
+    const std::optional<TomlReader> body = root_.table("body");
+    if (!body) throw root_.refusal("", "there is no [body]", "Add [body] with shape = \"...\".");
+    mesh_ = body_mesh<Dim>(*body, scene_.shape, scene_.warnings);
+    read_material();
+    for (const TomlReader& wave : root_.tables("activation")) read_wave(wave);
+    refuse_vanishing();
+    read_surroundings();
+    place(*body);
+    physics::touch_with_whole_surface(scenario_.scene);
+    for (const TomlReader& push : root_.tables("push")) read_push(push);
+    body->refuse_others();
+    return std::move(scenario_);
+  }
+
+ private:
+  static VectorOf<Dim> vector_or_zero(const TomlReader& table, const std::string& key) {
+    return table.numbers_or(key, VectorOf<Dim>::Zero());
+  }
+
+  physics::ElementMaterial material_of(const TomlReader& table, const physics::ElementMaterial& otherwise) const {
+    physics::ElementMaterial material;
+    material.density = table.number_or("density_kg_m3", otherwise.density, kAboveZero);
+    material.youngs_modulus = table.number_or("youngs_modulus_pa", otherwise.youngs_modulus, kAboveZero);
+    constexpr Within kRange{.least = 0, .most = 0.5, .without_most = true};
+    material.poissons_ratio = table.number_or("poissons_ratio", otherwise.poissons_ratio, kRange);
+    if (material.poissons_ratio < kLeastPoissonsRatio) {
+      throw table.refusal("poissons_ratio", "springs alone have a Poisson's ratio of 0.25", "Give 0.25 or more, below 0.5.");
+    }
+    return material;
+  }
+
+  void read_material() {
+    std::vector<physics::ElementMaterial> materials{{}};
+    double damping_time = physics::Material{}.damping_time;
+    if (const std::optional<TomlReader> table = root_.table("material")) {
+      table->choice_or_first("law", {"springs"});
+      materials[0] = material_of(*table, {});
+      damping_time = table->number_or("damping_time_s", damping_time, kNotNegative);
+      table->refuse_others();
+    }
+    PointsOf<Dim> middles = PointsOf<Dim>::Zero(Dim, mesh_.simplices.cols());
+    for (Eigen::Index t = 0; t < middles.cols(); ++t) {
+      for (int k = 0; k <= Dim; ++k) middles.col(t) += mesh_.nodes.col(mesh_.simplices(k, t)) / (Dim + 1);
+    }
+    Eigen::VectorXi material_of_simplex = Eigen::VectorXi::Zero(middles.cols());
+    for (const TomlReader& region : root_.tables("region")) {
+      materials.push_back(material_of(region, materials[0]));
+      const std::vector<char> within = points_within<Dim>(region, middles);
+      for (std::size_t t = 0; t < within.size(); ++t) {
+        if (within[t]) material_of_simplex[static_cast<Eigen::Index>(t)] = static_cast<int>(materials.size()) - 1;
+      }
+      region.refuse_others();
+    }
+    scenario_.scene.body = retarget::make_spring_body<Dim>(mesh_, materials, material_of_simplex, damping_time);
+    for (const physics::ElementMaterial& material : materials) {
+      scenario_.youngs_modulus = std::max(scenario_.youngs_modulus, material.youngs_modulus);
+    }
+    scenario_.length = (mesh_.nodes.rowwise().maxCoeff() - mesh_.nodes.rowwise().minCoeff()).maxCoeff();
+    scenario_.size = physics::size_of_volume<Dim>(scenario_.scene.body.rest_volume.sum());
+  }
+
+  VectorOf<Dim> direction(const TomlReader& table, const std::string& key) const {
+    const VectorOf<Dim> value = table.numbers(key, Dim);
+    if (value.norm() == 0) throw table.refusal(key, "'" + key + "' has no direction", "Give one that is not zero.");
+    return value.normalized();
+  }
+
+  void read_wave(const TomlReader& table) {
+    const physics::BodyOf<Dim>& body = scenario_.scene.body;
+    retarget::Wave wave;
+    wave.amplitude = table.number_or("amplitude", 0);
+    wave.offset = table.number_or("offset", 0);
+    wave.frequency_hz = table.number_or("frequency_hz", 0, kNotNegative);
+    wave.is_square = table.choice_or_first("waveform", {"sine", "square"}) == "square";
+    wave.from_s = table.number_or("from_s", 0, kNotNegative);
+    wave.until_s = table.number_or("until_s", wave.until_s, {.least = wave.from_s, .without_least = true});
+    PointsOf<Dim> middles(Dim, body.edge_count());
+    for (int e = 0; e < body.edge_count(); ++e) middles.col(e) = (mesh_.nodes.col(body.edges(0, e)) + mesh_.nodes.col(body.edges(1, e))) / 2;
+    const std::vector<char> within = points_within<Dim>(table, middles);
+    wave.share = Eigen::VectorXd::Zero(body.edge_count());
+    for (int e = 0; e < body.edge_count(); ++e) wave.share[e] = within[static_cast<std::size_t>(e)];
+    if (table.has("axis")) {
+      const VectorOf<Dim> axis = direction(table, "axis");
+      for (int e = 0; e < body.edge_count(); ++e) {
+        const VectorOf<Dim> span = mesh_.nodes.col(body.edges(1, e)) - mesh_.nodes.col(body.edges(0, e));
+        wave.share[e] *= std::pow(axis.dot(span.normalized()), 2);  // what a stretch along the axis does to the constraint
+      }
+    }
+    wave.phase = Eigen::VectorXd::Constant(body.edge_count(), radians(table.number_or("phase_deg", 0)));
+    if (table.has("wave_direction") || table.has("wavelength_m")) {
+      const double wavelength = table.number("wavelength_m", kAboveZero);
+      wave.phase -= 2 * M_PI / wavelength * (direction(table, "wave_direction").transpose() * middles).transpose();
+    }
+    table.refuse_others();
+    most_activation_.resize(body.edge_count());
+    if (scenario_.waves.empty()) most_activation_.setZero();
+    most_activation_ += wave.share * (std::abs(wave.amplitude) + std::abs(wave.offset));
+    scenario_.waves.push_back(std::move(wave));
+  }
+
+  void refuse_vanishing() const {
+    if (scenario_.waves.empty() || most_activation_.maxCoeff() <= kMostActivation) return;
+    throw root_.refusal("activation", "the activations of one constraint add up to " + std::to_string(most_activation_.maxCoeff()) + " beside 1",
+                        "Let amplitudes and offsets stay below 0.95 together.");
+  }
+
+  void read_surroundings() {
+    physics::SceneOf<Dim>& scene = scenario_.scene;
+    scene.gravity = root_.numbers_or("gravity_m_s2", -9.81 * VectorOf<Dim>::UnitY());
+    const std::optional<TomlReader> ground = root_.table("ground");
+    scene.has_ground = ground.has_value();
+    if (ground) {
+      const double slope = radians(ground->number_or("slope_deg", 0, {.least = -kSteepest, .most = kSteepest}));
+      scene.ground.normal = VectorOf<Dim>::Zero();
+      scene.ground.normal[0] = -std::sin(slope);
+      scene.ground.normal[1] = std::cos(slope);
+      scene.ground.offset = ground->number_or("height_m", 0) * scene.ground.normal[1];
+      scene.ground.friction = ground->number_or("friction", kFriction, kFrictionRange);
+      ground->refuse_others();
+    }
+    for (const TomlReader& obstacle : root_.tables("obstacle")) read_obstacle(obstacle);
+  }
+
+  void read_obstacle(const TomlReader& table) {
+    physics::ObstacleOf<Dim> obstacle;
+    const std::string mesh = Dim == 3 ? "mesh" : "outline";
+    const std::string shape = table.choice("shape", {"box", "ball", "half_space", mesh});
+    if (shape == "box") {
+      obstacle.shape = physics::BoxOf<Dim>{table.number_or_numbers("size_m", Dim, kAboveZero) / 2};
+    } else if (shape == "ball") {
+      obstacle.shape = physics::Ball{table.number("size_m", kAboveZero) / 2};
+    } else if (shape == mesh) {
+      obstacle.shape = surface_of<Dim>(table);
+    }
+    obstacle.place = vector_or_zero(table, "position_m");
+    obstacle.turn = rotation_of<Dim>(table);
+    obstacle.friction = table.number_or("friction", kFriction, kFrictionRange);
+    for (const TomlReader& move : table.tables("move")) {
+      retarget::MoveOf<Dim> moving;
+      moving.obstacle = static_cast<int>(scenario_.scene.obstacles.size());
+      moving.velocity = move.numbers("velocity_m_s", Dim);
+      moving.from_s = move.number_or("from_s", 0, kNotNegative);
+      moving.until_s = move.number_or("until_s", moving.until_s, {.least = moving.from_s, .without_least = true});
+      move.refuse_others();
+      scenario_.moves.push_back(moving);
+    }
+    table.refuse_others();
+    scenario_.scene.obstacles.push_back(std::move(obstacle));
+  }
+
+  void place(const TomlReader& body) {
+    physics::SceneOf<Dim>& scene = scenario_.scene;
+    physics::StateOf<Dim>& start = scenario_.start;
+    const physics::BlockOf<Dim> turn = rotation_of<Dim>(body);
+    scene.body.rest = (turn * mesh_.nodes).colwise() + vector_or_zero(body, "position_m");
+    if (body.has("gap_m")) {
+      if (!scene.has_ground) throw body.refusal("gap_m", "there is no ground to keep a gap from", "Add [ground], or leave 'gap_m' out.");
+      const double lowest = (scene.ground.normal.transpose() * scene.body.rest).minCoeff();
+      scene.body.rest.colwise() += (scene.ground.offset + body.number("gap_m") - lowest) * scene.ground.normal;
+    }
+    start.x = scene.body.rest;
+    const std::string shape = body.choice_or_first("start", {"rest", "random", "collapsed", "flattened"});
+    is_distorted_ = shape != "rest";
+    retarget::distort<Dim>(shape == "random"      ? StartShape::kRandom
+                           : shape == "collapsed" ? StartShape::kCollapsed
+                           : shape == "flattened" ? StartShape::kFlattened
+                                                  : StartShape::kRest,
+                           scene_.seed, start.x);
+    const VectorOf<Dim> velocity = vector_or_zero(body, "velocity_m_s"), centre = physics::centre_of_mass(scene.body, start.x);
+    start.v = velocity.replicate(1, start.x.cols());
+    for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += spin_velocity(body, start.x.col(i) - centre);
+  }
+
+  static VectorOf<Dim> spin_velocity(const TomlReader& body, const VectorOf<Dim>& arm) {
+    if constexpr (Dim == 2) {
+      return radians(body.number_or("spin_deg_s", 0)) * VectorOf<Dim>(-arm.y(), arm.x());
+    } else {
+      const Eigen::Vector3d spin = body.numbers_or("spin_deg_s", Eigen::Vector3d::Zero());
+      return radians(1) * spin.cross(arm);
+    }
+  }
+
+  void read_push(const TomlReader& table) {
+    retarget::PushOf<Dim> push;
+    push.time_s = table.number("time_s", kNotNegative);
+    push.duration_s = table.number_or("duration_s", push.duration_s, kAboveZero);
+    push.delta_v = table.numbers("delta_v_m_s", Dim);
+    table.refuse_others();
+    scenario_.pushes.push_back(push);
+  }
+
+ public:
+  bool is_distorted() const { return is_distorted_; }
+
+ private:
+  const TomlReader& root_;
+  SceneFile& scene_;
+  physics::SimplexMeshOf<Dim> mesh_;  // the rest shape in its own frame
+  ScenarioOf<Dim> scenario_;
+  Eigen::VectorXd most_activation_;  // E
+  bool is_distorted_ = false;
+};
+
+template <int Dim>
+void read_in_dimension(const TomlReader& root, SceneFile& scene) {
+  SceneReader<Dim> reader(root, scene);
+  scene.scenario = reader.read();
+  scene.element = Dim == 3 ? "tet" : "triangle";
+  const std::optional<physics::Method> method = method_named(root.choice_or_first("method", method_names()));
+  scene.method = method ? *method : reader.is_distorted() ? physics::Method::kEuler : physics::Method::kExplicit;
+}
+
+}  // namespace
+
+std::vector<std::string> method_names() { return {"auto", "explicit", "euler"}; }
+
+std::optional<physics::Method> method_named(const std::string& name) {
+  for (const physics::Method method : {physics::Method::kExplicit, physics::Method::kEuler}) {
+    if (name == physics::name_of(method)) return method;
+  }
+  return std::nullopt;
+}
+
+SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed) {
+  const toml::table table = parse_toml(file);
+  const TomlReader root(table, file, "");
+  for (const char* key : {"dimension", "dt_s", "duration_s", "seed", "method", "gravity_m_s2", "body", "material", "region", "ground",
+                          "obstacle", "activation", "push"}) {
+    root.has(key);
+  }
+  root.refuse_others();
+  SceneFile scene;
+  scene.file = std::filesystem::absolute(file).lexically_normal().string();
+  scene.sha256 = file_sha256(file);
+  scene.dt_s = root.number_or("dt_s", scene.dt_s, {.least = 1e-5, .most = 0.2});
+  scene.duration_s = root.number_or("duration_s", scene.duration_s, {.least = 1e-3, .most = 3600});
+  scene.seed = static_cast<unsigned>(root.whole_or("seed", 0, 0, 4294967295L));
+  if (seed) scene.seed = *seed;
+  if (root.whole_or("dimension", 3, 2, 3) == 3) {
+    read_in_dimension<3>(root, scene);
+  } else {
+    read_in_dimension<2>(root, scene);
+  }
+  return scene;
+}
+
+}  // namespace hydrostat::io

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "retarget/scenario.h"
+
+namespace hydrostat::io {
+
+/// A scene as its file tells it, meshed and ready to be simulated.
+struct SceneFile {
+  std::string file, sha256;
+  std::variant<retarget::ScenarioOf<2>, retarget::ScenarioOf<3>> scenario;
+  std::string shape;    // as the file calls the body's
+  std::string element;  // "tet" or "triangle"
+  physics::Method method = physics::Method::kExplicit;
+  double dt_s = 1.0 / 240, duration_s = 2;
+  unsigned seed = 0;
+  std::vector<std::string> warnings;
+};
+
+/// Names that `method` may have in a scene, the first of them "auto".
+std::vector<std::string> method_names();
+/// "auto" is nothing.
+std::optional<physics::Method> method_named(const std::string& name);
+
+/// Reads SCENE.toml (README, "Scene files"); `seed` is taken for the file's own where given. Files that it names lie relative to
+/// it. Throws Error with the line for what is not TOML, a key that is not known (with the nearest that is), a wrong type or range,
+/// a surface that is not closed, a mesh with slivers, a region that holds nothing, activations that could reach 0.
+SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed = std::nullopt);
+
+}  // namespace hydrostat::io

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/toml_reader.h"
+#include "physics/simplex_mesh.h"
+
+namespace hydrostat::io {
+
+/// Of an angle in degrees.
+constexpr double radians(double degrees) { return degrees * 3.14159265358979323846 / 180; }
+
+/// The turn of `rotation_deg`: in 2D an angle, in 3D about x, then y, then z of the world; none where it is missing.
+template <int Dim>
+physics::BlockOf<Dim> rotation_of(const TomlReader& table);
+
+/// A closed surface: `file` with `scale` in 3D, `outline_m` in 2D. Throws Error where it is not closed or cuts itself.
+template <int Dim>
+physics::ClosedMeshOf<Dim> surface_of(const TomlReader& table);
+
+/// The rest shape of [body] in its own frame. `shape` becomes its name, `warnings` receives what the mesh departs in.
+/// Throws Error where the shape is not told as it must be, gives slivers or falls into pieces.
+template <int Dim>
+physics::SimplexMeshOf<Dim> body_mesh(const TomlReader& body, std::string& shape, std::vector<std::string>& warnings);
+
+/// Which points (Dim x P, in the body's own frame) lie in the part that `table` names: `box_m`, or `normal` with `offset_m`; all
+/// where it names none. Throws Error where no point does.
+template <int Dim>
+std::vector<char> points_within(const TomlReader& table, const physics::PointsOf<Dim>& points);
+
+}  // namespace hydrostat::io

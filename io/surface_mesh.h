@@ -1,0 +1,14 @@
+#pragma once
+
+#include <filesystem>
+
+#include "physics/obstacle.h"
+
+namespace hydrostat::io {
+
+/// Reads a closed surface from a mesh file (.obj, .stl, .fbx, .dae, .glb, .gltf) in the worker process: all its meshes as they
+/// stand at rest, in metres, y up, welded at equal places. Shells that look inward are turned. Throws Error where the file
+/// cannot be read or the surface is not closed.
+physics::ClosedMeshOf<3> read_closed_mesh(const std::filesystem::path& file);
+
+}  // namespace hydrostat::io

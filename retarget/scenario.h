@@ -1,0 +1,73 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "physics/element_block.h"
+#include "physics/simplex_mesh.h"
+#include "physics/stepper.h"
+
+namespace hydrostat::retarget {
+
+/// A wave over the constraints' activations: share * (offset + amplitude * sin(2 pi frequency t + phase)), added to 1.
+struct Wave {
+  Eigen::VectorXd share;  // E, in 0..1: how much of it a constraint gets
+  Eigen::VectorXd phase;  // [rad] E
+  double amplitude = 0, offset = 0;
+  double frequency_hz = 0;
+  bool is_square = false;  // the sign of the sine in its place
+  double from_s = 0, until_s = 1e300;
+};
+
+/// A declared effect: a uniform force on all nodes that would change the body's velocity by delta_v within duration_s.
+template <int Dim>
+struct PushOf {
+  double time_s = 0, duration_s = 0.1;
+  physics::VectorOf<Dim> delta_v = physics::VectorOf<Dim>::Zero();  // [m/s]
+};
+
+/// An obstacle's velocity for a while; out of all its moves it stands still. Moves at one time add.
+template <int Dim>
+struct MoveOf {
+  int obstacle = 0;
+  double from_s = 0, until_s = 1e300;
+  physics::VectorOf<Dim> velocity = physics::VectorOf<Dim>::Zero();  // [m/s]
+};
+
+/// A body and all that happens to it: what a simulation without a clip starts from.
+template <int Dim>
+struct ScenarioOf {
+  physics::SceneOf<Dim> scene;
+  physics::StateOf<Dim> start;
+  std::vector<Wave> waves;
+  std::vector<PushOf<Dim>> pushes;
+  std::vector<MoveOf<Dim>> moves;
+  double length = 1, size = 1;  // L [m], longest extent of the rest shape's box; D [m]
+  double youngs_modulus = 0;    // [Pa] of the stiffest region
+};
+
+/// Springs and volume energy with the Lamé parameters of the material, for a lattice whose edges point everywhere: such a
+/// lattice has lambda = mu by itself, and the volume energy adds what is missing. Needs Poisson's ratio >= 1/4.
+template <int Dim>
+physics::Material spring_material(const physics::ElementMaterial& material, double damping_time);
+
+/// The body of a mesh whose simplex t is made of materials[material_of[t]].
+template <int Dim>
+physics::BodyOf<Dim> make_spring_body(const physics::SimplexMeshOf<Dim>& mesh,
+                                      const std::vector<physics::ElementMaterial>& materials,
+                                      const Eigen::VectorXi& material_of, double damping_time);
+
+/// The activations at a time [s]: 1 plus all waves. Allocates nothing once `activation` has its size.
+void activations_at(const std::vector<Wave>& waves, double time_s, Eigen::VectorXd& activation);
+
+enum class StartShape {
+  kRest,
+  kRandom,     // every node anywhere in the box of the rest shape
+  kCollapsed,  // all nodes in its middle
+  kFlattened,  // all nodes on the plane through its middle that is level
+};
+/// Moves the nodes of `x`, the placed rest shape; random ones by `seed`.
+template <int Dim>
+void distort(StartShape shape, unsigned seed, physics::PointsOf<Dim>& x);
+
+}  // namespace hydrostat::retarget

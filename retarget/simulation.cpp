@@ -1,0 +1,362 @@
+#include "retarget/simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "physics/elastic_forces.h"
+#include "retarget/cpu_seconds.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+using physics::PointsOf;
+using physics::SpinOf;
+using physics::VectorOf;
+
+constexpr double kGravity = 9.81;  // [m/s2] of the units in which figures are told
+
+template <int Dim>
+Eigen::Vector3d in_space(const VectorOf<Dim>& place) {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  point.head<Dim>() = place;
+  return point;
+}
+
+/// A column as Motion and Trace hold it: x0 y0 z0 x1 ...
+template <int Dim>
+Eigen::VectorXd column_of(const PointsOf<Dim>& points) {
+  Eigen::Matrix3Xd all = Eigen::Matrix3Xd::Zero(3, points.cols());
+  all.template topRows<Dim>() = points;
+  return all.reshaped();
+}
+
+template <int Dim>
+Eigen::Vector3d moment_of(const SpinOf<Dim>& spin) {
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  moment.tail<SpinOf<Dim>::RowsAtCompileTime>() = spin;
+  return moment;
+}
+
+/// The deepest that a contact point lies in ground or obstacles [m].
+template <int Dim>
+double penetration(const physics::SceneOf<Dim>& scene, const physics::StateOf<Dim>& state) {
+  double deepest = 0;
+  VectorOf<Dim> normal;
+  for (int p = 0; p < scene.contact_points.count(); ++p) {
+    const VectorOf<Dim> point = scene.contact_points.of(state.x, p);
+    if (scene.has_ground) deepest = std::max(deepest, scene.ground.offset - scene.ground.normal.dot(point));
+    for (std::size_t o = 0; o < scene.obstacles.size(); ++o) {
+      VectorOf<Dim> travel = VectorOf<Dim>::Zero();
+      if (state.obstacle_travel.cols() > 0) travel = state.obstacle_travel.col(static_cast<Eigen::Index>(o));
+      if (physics::distance_at_least<Dim>(scene.obstacles[o], travel, point) > 0) continue;
+      deepest = std::max(deepest, -physics::signed_distance<Dim>(scene.obstacles[o], travel, point, normal));
+    }
+  }
+  return deepest;
+}
+
+/// The velocity [m/s] that all pushes together give between two times: each counts with the share of its duration that lies
+/// there.
+template <int Dim>
+VectorOf<Dim> pushed_velocity(const std::vector<PushOf<Dim>>& pushes, double begin, double end) {
+  VectorOf<Dim> velocity = VectorOf<Dim>::Zero();
+  for (const PushOf<Dim>& push : pushes) {
+    const double seconds = std::min(end, push.time_s + push.duration_s) - std::max(begin, push.time_s);
+    if (seconds > 0) velocity += seconds / push.duration_s * push.delta_v;
+  }
+  return velocity;
+}
+
+/// What a row of the trace sums up over its steps.
+template <int Dim>
+struct RowSums {
+  PointsOf<Dim> contact, effect;
+  SpinOf<Dim> contact_moment = SpinOf<Dim>::Zero(), effect_moment = SpinOf<Dim>::Zero();
+  Eigen::VectorXd activation;
+  int steps = 0;
+
+  void clear() {
+    contact.setZero();
+    effect.setZero();
+    contact_moment.setZero();
+    effect_moment.setZero();
+    activation.setZero();
+    steps = 0;
+  }
+};
+
+/// One free simulation, step by step.
+template <int Dim>
+class Course {
+ public:
+  Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
+  Simulation play();
+
+ private:
+  struct Energy {
+    double kinetic, elastic, gravity;
+    double sum() const { return kinetic + elastic + gravity; }
+  };
+  Energy energy() const;
+  void set_velocities(double begin);
+  physics::Termination step();
+  void measure();
+  void write_row(Eigen::Index row);
+  void write_frame();
+  void tell_divergence();
+  Simulation finish();
+
+  const ScenarioOf<Dim>& scenario_;
+  const SimulationOptions& options_;
+  physics::SceneOf<Dim> scene_;  // a copy, whose obstacles change their velocities
+  const physics::BodyOf<Dim>& body_;
+  const std::unique_ptr<physics::StepperOf<Dim>> stepper_;
+  const long steps_, steps_per_frame_;
+  const double mass_, weight_, rest_volume_;
+
+  long done_ = 0;
+  double busy_s_ = 0, work_ = 0, energy_at_start_ = 0;
+  physics::StateOf<Dim> state_, before_;
+  Eigen::VectorXd activation_, next_activation_;
+  physics::ImpulsesOf<Dim> impulses_;
+  PointsOf<Dim> effect_;
+  RowSums<Dim> sums_;
+  Eigen::Index rows_ = 0;
+  std::vector<Eigen::VectorXd> frames_;
+  std::vector<PointsOf<Dim>> travels_;
+  std::vector<std::array<double, 9>> course_;
+  std::vector<Eigen::Vector3d> com_;
+  Simulation result_;
+};
+
+template <int Dim>
+Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& options)
+    : scenario_(scenario),
+      options_(options),
+      scene_(scenario.scene),
+      body_(scene_.body),
+      stepper_(physics::make_stepper(options.method, scene_)),
+      steps_(std::max(1L, std::lround(options.duration_s / options.dt_s))),
+      steps_per_frame_(std::max(1L, std::lround(1 / (options.frame_rate_hz * options.dt_s)))),
+      mass_(body_.mass.sum()),
+      weight_(kGravity * mass_),
+      rest_volume_(body_.rest_volume.sum()),
+      state_(scenario.start),
+      before_(state_),
+      activation_(body_.edge_count()),
+      next_activation_(activation_),
+      impulses_(physics::make_impulses(scene_)),
+      effect_(Dim, body_.node_count()) {
+  if (state_.obstacle_travel.cols() == 0) state_.obstacle_travel.setZero(Dim, static_cast<Eigen::Index>(scene_.obstacles.size()));
+  activations_at(scenario.waves, 0.5 * options.dt_s, activation_);
+  energy_at_start_ = energy().sum();
+  SimulationReport& report = result_.report;
+  report.dimension = Dim;
+  report.energy_start_mgl = energy_at_start_ / (weight_ * scenario.length);
+  sums_.contact = sums_.effect = effect_;
+  sums_.activation = activation_;
+  sums_.clear();
+  if (options.trace) {
+    result_.trace = empty_trace(body_, steps_ / options.steps_per_row + 1);
+    result_.trace.activation.col(0) = activation_;
+    write_row(0);
+  }
+  write_frame();
+}
+
+template <int Dim>
+typename Course<Dim>::Energy Course<Dim>::energy() const {
+  return {0.5 * state_.v.colwise().squaredNorm().dot(body_.mass), physics::elastic_energy(body_, state_.x, activation_),
+          -scene_.gravity.dot(state_.x * body_.mass)};
+}
+
+/// Gives the obstacles the velocities of the step that begins then: a move counts with the share of the step that it lasts.
+template <int Dim>
+void Course<Dim>::set_velocities(double begin) {
+  if (scenario_.moves.empty()) return;
+  for (const MoveOf<Dim>& move : scenario_.moves) scene_.obstacles[static_cast<std::size_t>(move.obstacle)].velocity.setZero();
+  for (const MoveOf<Dim>& move : scenario_.moves) {
+    const double seconds = std::min(begin + options_.dt_s, move.until_s) - std::max(begin, move.from_s);
+    if (seconds > 0) scene_.obstacles[static_cast<std::size_t>(move.obstacle)].velocity += seconds / options_.dt_s * move.velocity;
+  }
+}
+
+template <int Dim>
+physics::Termination Course<Dim>::step() {
+  const double dt = options_.dt_s, begin = static_cast<double>(done_) * dt;
+  before_ = state_;
+  if (!scenario_.waves.empty()) {
+    activations_at(scenario_.waves, begin + 0.5 * dt, next_activation_);
+    work_ += physics::elastic_energy(body_, state_.x, next_activation_) - physics::elastic_energy(body_, state_.x, activation_);
+    activation_.swap(next_activation_);
+  }
+  set_velocities(begin);
+  const VectorOf<Dim> pushed = pushed_velocity(scenario_.pushes, begin, begin + dt);
+  const bool has_effect = !pushed.isZero(0);
+  if (has_effect) effect_ = (pushed / dt) * body_.mass.transpose();
+  const double began = thread_seconds();
+  const physics::Termination termination = stepper_->step(dt, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
+  busy_s_ += thread_seconds() - began;
+  if (termination == physics::Termination::kDiverged) return termination;
+  ++done_;
+  work_ += impulses_.obstacle_work;
+  if (has_effect) work_ += effect_.cwiseProduct(state_.x - before_.x).sum();
+  return termination;
+}
+
+template <int Dim>
+void Course<Dim>::measure() {
+  SimulationReport& report = result_.report;
+  const double dt = options_.dt_s;
+  const VectorOf<Dim> change = physics::momentum(body_, state_.v) - physics::momentum(body_, before_.v);
+  const VectorOf<Dim> booked = impulses_.contact_nodes.rowwise().sum() + impulses_.effect_nodes.rowwise().sum() + dt * mass_ * scene_.gravity;
+  report.momentum_residual_mg = std::max(report.momentum_residual_mg, (change - booked).norm() / (dt * weight_));
+  const VectorOf<Dim> origin = VectorOf<Dim>::Zero();
+  const SpinOf<Dim> turn = physics::angular_momentum(body_, state_.x, state_.v, origin) -
+                           physics::angular_momentum(body_, before_.x, before_.v, origin) - impulses_.contact_moment -
+                           impulses_.effect_moment - impulses_.gravity_moment;
+  report.angular_residual_mgl = std::max(report.angular_residual_mgl, turn.norm() / (dt * weight_ * scenario_.length));
+  report.energy_excess_mgl =
+      std::max(report.energy_excess_mgl, (energy().sum() - energy_at_start_ - work_) / (weight_ * scenario_.length));
+  report.volume_error_end = std::abs(physics::volume(body_, state_.x) / rest_volume_ - 1);
+  report.volume_error_max = std::max(report.volume_error_max, report.volume_error_end);
+  report.inverted_elements_end = static_cast<int>((physics::jacobians(body_, state_.x).array() <= 0).count());
+  report.inverted_elements = std::max(report.inverted_elements, report.inverted_elements_end);
+  report.penetration_max_size = std::max(report.penetration_max_size, penetration(scene_, state_) / scenario_.size);
+  report.speed_end_m_s = state_.v.colwise().norm().maxCoeff();
+  report.speed_max_m_s = std::max(report.speed_max_m_s, report.speed_end_m_s);
+  if (options_.trace) {
+    sums_.contact += impulses_.contact_nodes;
+    sums_.effect += impulses_.effect_nodes;
+    sums_.contact_moment += impulses_.contact_moment;
+    sums_.effect_moment += impulses_.effect_moment;
+    sums_.activation += activation_;
+    if (++sums_.steps == options_.steps_per_row) write_row(done_ / options_.steps_per_row);
+  }
+}
+
+template <int Dim>
+void Course<Dim>::write_row(Eigen::Index row) {
+  Trace& trace = result_.trace;
+  const double seconds = sums_.steps * options_.dt_s;
+  rows_ = row + 1;
+  trace.time_s[row] = static_cast<double>(done_) * options_.dt_s;
+  trace.position.col(row) = column_of<Dim>(state_.x);
+  trace.velocity.col(row) = column_of<Dim>(state_.v);
+  if (sums_.steps == 0) return;
+  trace.contact_force.col(row) = column_of<Dim>(sums_.contact / seconds);
+  trace.effect_force.col(row) = column_of<Dim>(sums_.effect / seconds);
+  trace.contact_moment.col(row) = moment_of<Dim>(sums_.contact_moment / seconds);
+  trace.effect_moment.col(row) = moment_of<Dim>(sums_.effect_moment / seconds);
+  trace.activation.col(row) = sums_.activation / sums_.steps;
+  sums_.clear();
+}
+
+template <int Dim>
+void Course<Dim>::write_frame() {
+  const Energy here = energy();
+  frames_.push_back(column_of<Dim>(state_.x));
+  travels_.push_back(state_.obstacle_travel);
+  com_.push_back(in_space<Dim>(physics::centre_of_mass(body_, state_.x)));
+  const double force = impulses_.contact.colwise().norm().sum() / options_.dt_s;
+  course_.push_back({static_cast<double>(done_) * options_.dt_s, here.kinetic, here.elastic, here.gravity, work_,
+                     physics::volume(body_, state_.x) / rest_volume_, penetration(scene_, state_), force / weight_, activation_.mean()});
+}
+
+template <int Dim>
+void Course<Dim>::tell_divergence() {
+  SimulationReport& report = result_.report;
+  report.diverged = true;
+  report.diverged_time_s = static_cast<double>(done_) * options_.dt_s;
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "at %.3f s no step of %g s by the method '%s' led to a finite state; before it the fastest node moved at %.3g m/s and %ld "
+                "elements were inverted",
+                report.diverged_time_s, options_.dt_s, physics::name_of(options_.method).c_str(), state_.v.colwise().norm().maxCoeff(),
+                static_cast<long>((physics::jacobians(body_, state_.x).array() <= 0).count()));
+  report.diverged_cause = text;
+}
+
+template <int Dim>
+Simulation Course<Dim>::play() {
+  while (done_ < steps_) {
+    if (step() == physics::Termination::kDiverged) {
+      tell_divergence();
+      break;
+    }
+    if (options_.figures) measure();
+    if (done_ % steps_per_frame_ == 0) write_frame();
+  }
+  return finish();
+}
+
+template <int Dim>
+Simulation Course<Dim>::finish() {
+  SimulationReport& report = result_.report;
+  report.duration_s = static_cast<double>(done_) * options_.dt_s;
+  report.energy_end_mgl = energy().sum() / (weight_ * scenario_.length);
+  report.work_mgl = work_ / (weight_ * scenario_.length);
+  const Eigen::Vector3d up = in_space<Dim>(scene_.has_ground ? scene_.ground.normal : VectorOf<Dim>::UnitY());
+  const Eigen::Vector3d way = in_space<Dim>(physics::centre_of_mass(body_, state_.x)) - com_.front();
+  report.travel_length = (way - up * up.dot(way)).norm() / scenario_.length;
+  if (report.duration_s > 0) report.ms_per_sim_s = 1000 * busy_s_ / report.duration_s;
+  if (busy_s_ > 0) report.real_time_factor = report.duration_s / busy_s_;
+
+  const auto count = static_cast<Eigen::Index>(frames_.size());
+  Motion& motion = result_.motion;
+  motion.rate_hz = 1 / (static_cast<double>(steps_per_frame_) * options_.dt_s);
+  motion.frames.resize(frames_.front().size(), count);
+  result_.obstacle_travels.assign(scene_.obstacles.size(), {motion.rate_hz, Eigen::MatrixXd::Zero(3, count)});
+  SimulationCourse& course = result_.course;
+  course.com.resize(3, count);
+  Eigen::VectorXd* const columns[] = {&course.time_s, &course.kinetic_j, &course.elastic_j, &course.gravity_j, &course.work_j,
+                                      &course.volume_ratio, &course.penetration_m, &course.contact_weights, &course.mean_activation};
+  for (Eigen::VectorXd* column : columns) column->resize(count);
+  for (Eigen::Index f = 0; f < count; ++f) {
+    const auto frame = static_cast<std::size_t>(f);
+    motion.frames.col(f) = frames_[frame];
+    course.com.col(f) = com_[frame];
+    for (std::size_t k = 0; k < std::size(columns); ++k) (*columns[k])[f] = course_[frame][k];
+    for (std::size_t o = 0; o < scene_.obstacles.size(); ++o) {
+      result_.obstacle_travels[o].frames.template block<Dim, 1>(0, f) = travels_[frame].col(static_cast<Eigen::Index>(o));
+    }
+  }
+  if (options_.trace) shorten(result_.trace, rows_);
+  return std::move(result_);
+}
+
+}  // namespace
+
+std::string broken_rule(const SimulationOptions& options) {
+  if (!(options.dt_s > 0) || !std::isfinite(options.dt_s)) return "dt_s is not above 0";
+  if (!(options.duration_s > 0) || !std::isfinite(options.duration_s)) return "duration_s is not above 0";
+  if (!(options.frame_rate_hz > 0)) return "frame_rate_hz is not above 0";
+  if (options.steps_per_row < 1) return "steps_per_row is below 1";
+  return {};
+}
+
+template <int Dim>
+Simulation simulate(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
+  return Course<Dim>(scenario, options).play();
+}
+template <int Dim>
+double substep_error(const ScenarioOf<Dim>& scenario, SimulationOptions options) {
+  options.trace = options.figures = false;
+  options.duration_s = std::min(1.0, options.duration_s);
+  const Motion whole = simulate(scenario, options).motion;
+  const double substep = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
+  options.frame_rate_hz = whole.rate_hz;
+  options.dt_s /= 2 * std::max(1.0, std::round(options.dt_s / substep));
+  const Motion halved = simulate(scenario, options).motion;
+  const Eigen::Index frames = std::min(whole.count(), halved.count());
+  const double squared = (whole.frames.leftCols(frames) - halved.frames.leftCols(frames)).squaredNorm();
+  return std::sqrt(squared / static_cast<double>(frames * scenario.scene.body.node_count())) / scenario.length;
+}
+template double substep_error<2>(const ScenarioOf<2>&, SimulationOptions);
+template double substep_error<3>(const ScenarioOf<3>&, SimulationOptions);
+
+template Simulation simulate<2>(const ScenarioOf<2>&, const SimulationOptions&);
+template Simulation simulate<3>(const ScenarioOf<3>&, const SimulationOptions&);
+
+}  // namespace hydrostat::retarget

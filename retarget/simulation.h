@@ -1,0 +1,54 @@
+#pragma once
+
+#include "retarget/motion.h"
+#include "retarget/run_report.h"
+#include "retarget/scenario.h"
+#include "retarget/trace.h"
+
+namespace hydrostat::retarget {
+
+struct SimulationOptions {
+  physics::Method method = physics::Method::kExplicit;
+  double dt_s = 1.0 / 240;
+  double duration_s = 2;
+  double frame_rate_hz = 60;  // of the motion, at most
+  bool figures = true;  // false: the motion alone, without report and course
+  bool trace = false;
+  int steps_per_row = 1;  // of the trace
+};
+/// Which value of the options breaks which rule, empty when all is well.
+std::string broken_rule(const SimulationOptions& options);
+
+/// Time courses, one entry a frame of the motion.
+struct SimulationCourse {
+  Eigen::VectorXd time_s;
+  Eigen::Matrix3Xd com;                                  // [m]
+  Eigen::VectorXd kinetic_j, elastic_j, gravity_j, work_j;  // work: done on the body since the start
+  Eigen::VectorXd volume_ratio, penetration_m, mean_activation;
+  Eigen::VectorXd contact_weights;  // sizes of the forces at all contact points, added up
+};
+
+/// What came of a scene. In 2D, z = 0.
+struct Simulation {
+  Motion motion;                         // nodes, 3N x F
+  std::vector<Motion> obstacle_travels;  // 3 x F, of each obstacle from where the scene has it
+  SimulationCourse course;
+  SimulationReport report;
+  Trace trace;  // filled where asked
+};
+
+/// Lets the body go from its start: nothing acts but what the scenario holds. Stops where the simulation diverges; all that is
+/// handed over ends before that step. The options must break no rule.
+template <int Dim>
+Simulation simulate(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
+
+/// How far the nodes move [per L, RMS over nodes and the frames of at most the first second] when the method's own substep is
+/// halved.
+template <int Dim>
+double substep_error(const ScenarioOf<Dim>& scenario, SimulationOptions options);
+
+/// Every effect that a scene can have: whether it is on, why, and what it costs, timed here on the scene's own body.
+template <int Dim>
+std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
+
+}  // namespace hydrostat::retarget

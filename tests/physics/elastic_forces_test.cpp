@@ -7,7 +7,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 30;
+constexpr unsigned kSeeds = trials(30);
 
 template <int Dim>
 struct Deformed {
@@ -46,7 +46,7 @@ TYPED_TEST(ElasticForces, AreMinusTheGradientOfEnergy) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Deformed<Dim> d = deformed<Dim>(seed);
     add_elastic_forces(d.body, d.state.x, d.activation, d.force);
-    PointsOf<Dim> slope(3, d.body.node_count()), x = d.state.x;
+    PointsOf<Dim> slope(Dim, d.body.node_count()), x = d.state.x;
     for (Eigen::Index k = 0; k < x.size(); ++k) {
       const double here = x.reshaped()[k];
       x.reshaped()[k] = here + kStep;

@@ -30,7 +30,7 @@ TYPED_TEST(MakeBody, HoldsTheMassAndVolumeOfWhatFillsTheLattice) {
 
 TYPED_TEST(MakeBody, SharesEachTetsVolumeAmongItsEdges) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < trials(20u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const BodyOf<Dim> body = random_body<Dim>(seed);
     const Material material;
@@ -69,7 +69,7 @@ TYPED_TEST(MakeBody, ResistsEvenStretchAsASolidOfItsYoungsModulusAndPoissonsRati
 
 TYPED_TEST(WholeBody, HasTheJacobiansOfAnAffineMap) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < trials(20u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const BodyOf<Dim> body = random_body<Dim>(seed);
@@ -82,7 +82,7 @@ TYPED_TEST(WholeBody, HasTheJacobiansOfAnAffineMap) {
 
 TYPED_TEST(WholeBody, HasTheAngularMomentumOfItsInertiaTimesItsRateOfTurning) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < trials(20u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const BodyOf<Dim> body = random_body<Dim>(seed);

@@ -139,7 +139,7 @@ TEST(ContactSet, FindsTheCornerOfABoxInTheMiddleOfAFace) {
 TYPED_TEST(ContactSets, ShareALoadAmongPointsWithTheSameForceAndMoment) {
   constexpr int Dim = TypeParam::kDim;
   std::mt19937 random(1);
-  for (int n = 0; n < 20; ++n) {
+  for (int n = 0; n < trials(20); ++n) {
     ObstacleOf<Dim> ball;
     ball.shape = Ball{0.3};
     ball.place = vec<Dim>(0.3, -0.28, 0.35) + random_points<Dim>(random, 1, 0.1).col(0);

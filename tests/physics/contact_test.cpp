@@ -69,8 +69,9 @@ TYPED_TEST(Contact, HoldsABlockOnASlopeOfAnyKindWithinTheCone) {
                         if (++steps == 240) settled = centre_of_mass(scene.body, after.x);
                         residual = std::max(residual, momentum_residual(scene, before, after, impulses, kDt));
                       });
-    EXPECT_LT((centre_of_mass(scene.body, end.x) - settled).norm(), 0.0005);  // [m] in one second
     EXPECT_LT(residual, 1e-6);
+    if (kSanitized) continue;  // the rest is of the end
+    EXPECT_LT((centre_of_mass(scene.body, end.x) - settled).norm(), 0.0005);  // [m] in one second
   }
 }
 
@@ -89,6 +90,7 @@ TYPED_TEST(Contact, LetsABlockSlideDownASlopeOfAnyKindBeyondTheCone) {
                     if (++steps == 240) speed = along;
                     faster = along - speed;
                   });
+    if (kSanitized) continue;  // the rest is of the end
     const double angle = 20 * 3.14159265358979323846 / 180;
     EXPECT_NEAR(faster / (kGravity * (std::sin(angle) - 0.3 * std::cos(angle))), 1, 0.02);  // in the second second
   }
@@ -113,6 +115,7 @@ TYPED_TEST(Contact, GivesEachObstacleItsOwnFriction) {
     state.x.row(0).array() += starts_on_ice ? 1 : -3;
     state.v.row(0).setConstant(1);
     const StateOf<Dim> end = simulate<Dim>(TypeParam::kMethod, scene, state, kDt, 48, look_at_nothing<Dim>);
+    if (kSanitized) continue;  // the rest is of the end
     const double speed = momentum(brick, end.v).x() / brick.mass.sum();
     EXPECT_NEAR(speed, starts_on_ice ? 1 : 1 - 0.4 * kGravity * 0.2, starts_on_ice ? 1e-9 : 0.03);
   }
@@ -137,6 +140,7 @@ TYPED_TEST(Contact, RollsABallDownASlopeAsItsInertiaSays) {
                   way += speed;
                   turns += angular_momentum(body, after.x, after.v, centre_of_mass(body, after.x)).norm() / turning_inertia;
                 });
+  if (kSanitized) return;  // the rest is of the end
   const double expected =
       kGravity * std::sin(kDegrees * 3.14159265358979323846 / 180) / (1 + turning_inertia / (mass * kRadius * kRadius));
   EXPECT_NEAR(speed / expected, 1, 0.05);       // after a second; the corners of the mesh take a little
@@ -162,6 +166,7 @@ TYPED_TEST(Contact, ThrowsAFallingBarBackAsItsWavesSay) {
                                          [&](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>& impulses) {
                                            if (impulses.contact.norm() > 0) touched += dt;
                                          });
+  if (kSanitized) return;  // the rest is of the end
   EXPECT_NEAR(touched / (2 * kLength / wave_speed), 1, 0.2);  // the wave runs up and down once
   const double back = momentum(scene.body, end.v).y() / scene.body.mass.sum() / kSpeed;
   EXPECT_GT(back, 0.8);
@@ -201,6 +206,7 @@ TYPED_TEST(Contact, StopsAFallOnAnythingWithinTwoPercentOfTheBodysSize) {
                   });
     EXPECT_LT(deepest, 0.02 * size_of(scene.body));
     EXPECT_LT(residual, 1e-6);
+    if (kSanitized) continue;  // the rest is of the end
     EXPECT_GT(carried.y(), 0.5 * scene.body.mass.sum());  // [N s]: it has met it
   }
 }
@@ -224,6 +230,7 @@ TYPED_TEST(Contact, BooksTheWorkOfAPlateThatLifts) {
   const StateOf<Dim> end = simulate<Dim>(
       TypeParam::kMethod, scene, state, kDt, 240,
       [&](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>& impulses) { work += impulses.obstacle_work; });
+  if (kSanitized) return;  // the rest is of the end
   const double weight = scene.body.mass.sum() * kGravity;
   EXPECT_NEAR(work / (weight * kSpeed), 1, 0.01);  // [J] in one second
   EXPECT_NEAR((energy(scene, end, passive(scene.body)) - at_first) / work, 1, 0.01);
@@ -243,6 +250,7 @@ TYPED_TEST(Contact, CarriesABlockAlongOnAPlateThatMovesSideways) {
   const StateOf<Dim> end = simulate<Dim>(
       TypeParam::kMethod, scene, state, kDt, 240,
       [&](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>& impulses) { work += impulses.obstacle_work; });
+  if (kSanitized) return;  // the rest is of the end
   const double mass = scene.body.mass.sum();
   EXPECT_NEAR(momentum(scene.body, end.v).x() / mass, 0.5, 0.01);
   EXPECT_NEAR(work / (mass * 0.5 * 0.5), 1, 0.03);  // half of it went into heat while it slipped
@@ -273,9 +281,10 @@ TYPED_TEST(Contact, LiftsABodyOutOfWhatItStartsInWithoutThrowingIt) {
                         excess = std::max(excess, energy(scene, after, passive(scene.body)) - at_first - work);
                         highest = std::max(highest, centre_of_mass(scene.body, after.x).y() - height);
                       });
-    EXPECT_LT(deepest_place(scene, end), 0.02 * size_of(scene.body));
     EXPECT_LT(excess, 0.01 * scale);
     EXPECT_LT(highest, 0.1 + 0.1 * size_of(scene.body));
+    if (kSanitized) continue;  // the rest is of the end
+    EXPECT_LT(deepest_place(scene, end), 0.02 * size_of(scene.body));
     EXPECT_GT(jacobians(scene.body, end.x).minCoeff(), 0.5);
   }
 }

@@ -7,7 +7,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 30;
+constexpr unsigned kSeeds = trials(30);
 
 template <int Dim>
 struct Deformed {

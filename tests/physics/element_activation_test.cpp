@@ -12,7 +12,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 15;
+constexpr unsigned kSeeds = trials(15);
 
 template <class Dimension>
 class Activation : public testing::Test {};

@@ -9,7 +9,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 20;
+constexpr unsigned kSeeds = trials(20);
 
 TEST(MakeElementConstraints, AreThePairsOfEachElementOnce) {
   const auto count = [](const auto& mesh) { return make_element_constraints(mesh.nodes).count(); };

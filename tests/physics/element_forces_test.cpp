@@ -7,7 +7,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 20;
+constexpr unsigned kSeeds = trials(20);
 
 template <class Dimension>
 class Elements : public testing::Test {};

@@ -9,7 +9,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 50;
+constexpr unsigned kSeeds = trials(50);
 
 template <class Dimension>
 class Boxes : public testing::Test {};

@@ -11,6 +11,7 @@
 
 #include "physics/element_forces.h"
 #include "physics/element_stiffness.h"
+#include "tests/sanitizers.h"
 
 namespace hydrostat::physics {
 

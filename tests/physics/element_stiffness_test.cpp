@@ -10,7 +10,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 12;
+constexpr unsigned kSeeds = trials(12);
 
 template <class Dimension>
 class Stiffness : public testing::Test {};

@@ -12,6 +12,7 @@
 
 #include "physics/elastic_forces.h"
 #include "physics/stepper.h"
+#include "tests/sanitizers.h"
 
 namespace hydrostat::physics {
 

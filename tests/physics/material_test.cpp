@@ -11,11 +11,12 @@
 #include <random>
 
 #include "physics/material_rotation.h"
+#include "tests/sanitizers.h"
 
 namespace hydrostat::physics {
 namespace {
 
-constexpr unsigned kSeeds = 200;
+constexpr unsigned kSeeds = trials(200);
 constexpr ElasticLaw kLaws[] = {ElasticLaw::kStableNeoHookean, ElasticLaw::kCorotatedLinear};
 constexpr double kYoungsModulus = 3;  // [Pa], so that errors are relative to about 1
 

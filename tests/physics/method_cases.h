@@ -31,13 +31,13 @@ inline double angular_tolerance(Method method) {
   return std::numeric_limits<double>::infinity();  // its own, told in its header
 }
 
-/// Steps a scene with one method and gives each step to `look(before, after, impulses)`.
+/// Steps a scene with one method, the first few with sanitizers, and gives each step to `look(before, after, impulses)`.
 template <int Dim, typename Look>
 StateOf<Dim> simulate(Method method, const SceneOf<Dim>& scene, StateOf<Dim> state, double dt, int steps, const Look& look) {
   const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
   ImpulsesOf<Dim> impulses = make_impulses(scene);
   const Eigen::VectorXd ones = passive(scene.body);
-  for (int k = 0; k < steps; ++k) {
+  for (int k = 0; k < few_steps(steps); ++k) {
     const StateOf<Dim> before = state;
     const Termination termination = stepper->step(dt, ones, nullptr, state, impulses);
     EXPECT_TRUE(termination == Termination::kDone) << "diverged in step " << k;

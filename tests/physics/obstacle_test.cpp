@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/physics/obstacle_shapes.h"
+#include "tests/sanitizers.h"
 
 namespace hydrostat::physics {
 namespace {
@@ -28,7 +29,7 @@ TYPED_TEST(Obstacles, HaveAUnitNormalThatIsTheSlopeOfTheirDistance) {
   constexpr int Dim = TypeParam::kDim;
   constexpr double kStep = 1e-6;  // [m]
   int compared = 0;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < trials(20u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const VectorOf<Dim> travel = random_points<Dim>(random, 1, 1);
@@ -52,7 +53,7 @@ TYPED_TEST(Obstacles, HaveAUnitNormalThatIsTheSlopeOfTheirDistance) {
       }
     }
   }
-  EXPECT_GT(compared, 1400);
+  EXPECT_GT(compared, 70 * trials(20));
 }
 
 TYPED_TEST(Obstacles, MadeOfFacesAreAsFarAsTheShapeThatTheyBound) {
@@ -62,7 +63,7 @@ TYPED_TEST(Obstacles, MadeOfFacesAreAsFarAsTheShapeThatTheyBound) {
   const VectorOf<Dim> half_extents = vec<Dim>(0.6, 0.2, 0.3);
   box.shape = BoxOf<Dim>{half_extents};
   faces.shape = box_mesh<Dim>(half_extents);
-  for (int n = 0; n < 2000; ++n) {
+  for (int n = 0; n < trials(2000); ++n) {
     const VectorOf<Dim> point = random_points<Dim>(random, 1, 0.9), nowhere = VectorOf<Dim>::Zero();
     VectorOf<Dim> of_box, of_faces;
     const double distance = signed_distance<Dim>(box, nowhere, point, of_box);
@@ -82,7 +83,7 @@ TYPED_TEST(Obstacles, TellInsideFromOutsideByTheirCornersAsAStarDoes) {
   });
   std::mt19937 random(1);
   int told = 0;
-  for (int n = 0; n < 3000; ++n) {
+  for (int n = 0; n < trials(3000); ++n) {
     const VectorOf<Dim> point = random_points<Dim>(random, 1, 1.5);
     VectorOf<Dim> normal;
     const double margin = point.norm() - radius(point.normalized());
@@ -90,7 +91,7 @@ TYPED_TEST(Obstacles, TellInsideFromOutsideByTheirCornersAsAStarDoes) {
     EXPECT_EQ(star.signed_distance(point, normal) > 0, margin > 0) << point.transpose();
     ++told;
   }
-  EXPECT_GT(told, 1500);
+  EXPECT_GT(told, trials(3000) / 2);
 }
 
 TYPED_TEST(Obstacles, AreRefusedWithAWordWhereTheirFacesDoNotClose) {

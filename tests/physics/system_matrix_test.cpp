@@ -43,7 +43,7 @@ TYPED_TEST_SUITE(SystemMatrices, BothDimensions, DimensionName);
 
 TYPED_TEST(SystemMatrices, StiffnessIsTheHessianAtRest) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 6; ++seed) {
+  for (unsigned seed = 0; seed < trials(6u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const BodyOf<Dim> body = random_body<Dim>(seed);
     const Eigen::VectorXd ones = passive(body);
@@ -61,7 +61,7 @@ TYPED_TEST(SystemMatrices, StiffnessIsTheHessianAtRest) {
 
 TYPED_TEST(SystemMatrices, DampingIsTheSlopeOfTheDashpots) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 6; ++seed) {
+  for (unsigned seed = 0; seed < trials(6u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const BodyOf<Dim> body = random_body<Dim>(seed);
@@ -80,7 +80,7 @@ TYPED_TEST(SystemMatrices, DampingIsTheSlopeOfTheDashpots) {
 
 TYPED_TEST(SystemMatrices, IsPositiveSemiDefiniteInAnyState) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < trials(20u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const BodyOf<Dim> body = random_body<Dim>(seed);
@@ -95,7 +95,7 @@ TYPED_TEST(SystemMatrices, IsPositiveSemiDefiniteInAnyState) {
 
 TYPED_TEST(SystemMatrices, ContactIsASpringAtTheEmbeddedPoint) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < trials(20u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const BodyOf<Dim> body = random_body<Dim>(seed);
@@ -115,7 +115,7 @@ TYPED_TEST(SystemMatrices, ContactIsASpringAtTheEmbeddedPoint) {
 
 TYPED_TEST(SystemMatrices, SolvesForSeveralColumnsAtOnce) {
   constexpr int Dim = TypeParam::kDim;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < trials(20u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const BodyOf<Dim> body = seed == 0 ? four_legged<Dim>() : random_body<Dim>(seed);

@@ -44,9 +44,12 @@ const std::map<std::string, retarget::RootMotion> kRootMotions{{"auto", retarget
                                                                {"keep", retarget::RootMotion::kKeep},
                                                                {"from-feet", retarget::RootMotion::kFromFeet},
                                                                {"none", retarget::RootMotion::kNone}};
-const std::map<std::string, physics::Method> kMethods{{"auto", retarget::CreatureOptions().method},
-                                                      {"explicit", physics::Method::kExplicit},
-                                                      {"euler", physics::Method::kEuler}};
+std::map<std::string, physics::Method> methods_by_name() {
+  std::map<std::string, physics::Method> methods{{"auto", retarget::CreatureOptions().method}};
+  for (const physics::Method method : physics::kMethods) methods.emplace(physics::name_of(method), method);
+  return methods;
+}
+const std::map<std::string, physics::Method> kMethods = methods_by_name();
 
 /// The key of a stage: all that the stage before depends on, and what this one adds.
 template <typename... Values>

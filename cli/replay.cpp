@@ -78,9 +78,7 @@ int steps_per_row(const ReplayCommand& command, const retarget::ReplayOptions& o
 retarget::PerformOptions perform_options(const ReplayCommand& command, const io::LoadedCreature& creature) {
   const retarget::Motion& target = creature.target.performer.prepared.target;
   retarget::PerformOptions options;
-  options.replay.method = io::setting(creature.record, "method", "") == physics::name_of(physics::Method::kEuler)
-                              ? physics::Method::kEuler
-                              : physics::Method::kExplicit;
+  options.replay.method = physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
   options.replay.duration_s = command.duration > 0  ? command.duration
                               : command.cycles > 0 ? command.cycles * target.duration_s()
                                                    : retarget::usual_duration(target);

@@ -242,13 +242,14 @@ void read_in_dimension(const TomlReader& root, SceneFile& scene) {
 
 }  // namespace
 
-std::vector<std::string> method_names() { return {"auto", "explicit", "euler"}; }
+std::vector<std::string> method_names() {
+  std::vector<std::string> names{"auto"};
+  for (const physics::Method method : physics::kMethods) names.push_back(physics::name_of(method));
+  return names;
+}
 
 std::optional<physics::Method> method_named(const std::string& name) {
-  for (const physics::Method method : {physics::Method::kExplicit, physics::Method::kEuler}) {
-    if (name == physics::name_of(method)) return method;
-  }
-  return std::nullopt;
+  return physics::method_named(name);
 }
 
 SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed) {

@@ -9,7 +9,6 @@ namespace hydrostat::physics {
 namespace {
 
 constexpr double kFaster = 1.25;   // kinetic energy over that at the start and the work [-]: less is not looked into
-constexpr double kGrowth = 0.5;    // of the energy [-] beyond the work: symplectic steps let it swing, unstable ones multiply it
 constexpr double kCalm = 0.01;     // of the energy of a body as fast as push_out_speed: less is never too much
 constexpr int kMostHalvings = 6;   // of euler's step where its solver finds no end
 
@@ -35,9 +34,10 @@ void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum) {
 template <int Dim>
 class GuardedStepper final : public StepperOf<Dim> {
  public:
-  GuardedStepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate)
+  GuardedStepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate, double growth)
       : scene_(scene),
         accurate_(std::move(accurate)),
+        growth_(growth),
         forces_(scene.body),
         start_{scene.body.rest, scene.body.rest},
         calm_energy_(kCalm * 0.5 * scene.body.mass.sum() * std::pow(push_out_speed(scene), 2)) {}
@@ -86,7 +86,7 @@ class GuardedStepper final : public StepperOf<Dim> {
     if (after <= kFaster * before + std::max(0.0, work) + calm_energy_) return true;
     if (!forces_.set_activation(activation)) return false;
     const double elastic = forces_.elastic_energy(start_.x), gain = after + forces_.elastic_energy(state.x) - before - elastic;
-    return gain <= work + kGrowth * (before + elastic) + calm_energy_;
+    return gain <= work + growth_ * (before + elastic) + calm_energy_;
   }
 
   Termination take_over(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -120,6 +120,7 @@ class GuardedStepper final : public StepperOf<Dim> {
 
   const SceneOf<Dim>& scene_;
   std::unique_ptr<StepperOf<Dim>> accurate_, euler_;  // euler from its first step on
+  double growth_;  // of the energy [-] in a step beyond the work on the body
   InternalForces<Dim> forces_;
   StateOf<Dim> start_;
   ImpulsesOf<Dim> part_;
@@ -132,10 +133,11 @@ class GuardedStepper final : public StepperOf<Dim> {
 }  // namespace
 
 template <int Dim>
-std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate) {
-  return std::make_unique<GuardedStepper<Dim>>(scene, std::move(accurate));
+std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate,
+                                                     double growth) {
+  return std::make_unique<GuardedStepper<Dim>>(scene, std::move(accurate), growth);
 }
-template std::unique_ptr<StepperOf<2>> make_guarded_stepper<2>(const SceneOf<2>&, std::unique_ptr<StepperOf<2>>);
-template std::unique_ptr<StepperOf<3>> make_guarded_stepper<3>(const SceneOf<3>&, std::unique_ptr<StepperOf<3>>);
+template std::unique_ptr<StepperOf<2>> make_guarded_stepper<2>(const SceneOf<2>&, std::unique_ptr<StepperOf<2>>, double);
+template std::unique_ptr<StepperOf<3>> make_guarded_stepper<3>(const SceneOf<3>&, std::unique_ptr<StepperOf<3>>, double);
 
 }  // namespace hydrostat::physics

@@ -1,6 +1,14 @@
 #include "physics/stepper.h"
 
 namespace hydrostat::physics {
+namespace {
+
+// Velocities half a substep beside the places let the energy of a mode at 0.8 of the stability bound swing between 1 / 1.8
+// and 1 / 0.2 of its mean.
+constexpr double kExplicitGrowth = 8;
+constexpr double kImplicitGrowth = 0.5;
+
+}  // namespace
 
 std::string name_of(Method method) {
   switch (method) {
@@ -10,19 +18,34 @@ std::string name_of(Method method) {
       return "euler";
     case Method::kImplicit:
       return "implicit";
+    case Method::kXpbd:
+      return "xpbd";
+    case Method::kSpring:
+      return "spring";
   }
   return {};
+}
+
+std::optional<Method> method_named(const std::string& name) {
+  for (const Method method : kMethods) {
+    if (name_of(method) == name) return method;
+  }
+  return std::nullopt;
 }
 
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene) {
   switch (method) {
     case Method::kExplicit:
-      return make_guarded_stepper(scene, make_explicit_stepper(scene));
+      return make_guarded_stepper(scene, make_explicit_stepper(scene), kExplicitGrowth);
     case Method::kEuler:
       return make_euler_stepper(scene);
     case Method::kImplicit:
-      return make_guarded_stepper(scene, make_implicit_stepper(scene));
+      return make_guarded_stepper(scene, make_implicit_stepper(scene), kImplicitGrowth);
+    case Method::kXpbd:
+      return make_xpbd_stepper(scene);
+    case Method::kSpring:
+      return make_spring_stepper(scene);
   }
   return nullptr;
 }

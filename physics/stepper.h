@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "physics/scene.h"
@@ -27,17 +28,22 @@ class StepperOf {
 };
 using Stepper = StepperOf<3>;
 
-enum class Method { kExplicit, kEuler, kImplicit };
+enum class Method { kExplicit, kImplicit, kEuler, kXpbd, kSpring };
+constexpr Method kMethods[] = {Method::kExplicit, Method::kImplicit, Method::kEuler, Method::kXpbd, Method::kSpring};
 std::string name_of(Method method);
+/// None for a name that no method has.
+std::optional<Method> method_named(const std::string& name);
 /// explicit and implicit come guarded (make_guarded_stepper). Throws nothing; every scene is accepted. The scene must outlive
 /// the stepper.
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene);
 
 /// A step of `accurate` that ends with an inverted tet, with much more energy than was there or was brought in, or with what
-/// is no number is taken again by euler, and so is every step from a state with an inverted tet.
+/// is no number is taken again by euler, and so is every step from a state with an inverted tet. `growth` [-]: of the energy in
+/// a step beyond the work on the body, that the accurate method's own velocities show when all is well.
 template <int Dim>
-std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate);
+std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate,
+                                                     double growth);
 
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene);
@@ -45,5 +51,9 @@ template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_euler_stepper(const SceneOf<Dim>& scene);
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_implicit_stepper(const SceneOf<Dim>& scene);
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_xpbd_stepper(const SceneOf<Dim>& scene);
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_spring_stepper(const SceneOf<Dim>& scene);
 
 }  // namespace hydrostat::physics

@@ -143,7 +143,8 @@ TYPED_TEST(Contact, RollsABallDownASlopeAsItsInertiaSays) {
   if (kSanitized) return;  // the rest is of the end
   const double expected =
       kGravity * std::sin(kDegrees * 3.14159265358979323846 / 180) / (1 + turning_inertia / (mass * kRadius * kRadius));
-  EXPECT_NEAR(speed / expected, 1, 0.05);       // after a second; the corners of the mesh take a little
+  // After a second; the corners of the mesh take a little, of a softer ball more.
+  EXPECT_NEAR(speed / expected, 1, is_draft(TypeParam::kMethod) ? 0.15 : 0.05);
   EXPECT_NEAR(turns * kRadius / way, 1, 0.03);  // it does not slip
 }
 
@@ -281,7 +282,7 @@ TYPED_TEST(Contact, LiftsABodyOutOfWhatItStartsInWithoutThrowingIt) {
                         excess = std::max(excess, energy(scene, after, passive(scene.body)) - at_first - work);
                         highest = std::max(highest, centre_of_mass(scene.body, after.x).y() - height);
                       });
-    EXPECT_LT(excess, 0.01 * scale);
+    EXPECT_LT(excess, is_draft(TypeParam::kMethod) ? 0.2 * scale : 0.01 * scale);  // drafts leave some energy uncounted
     EXPECT_LT(highest, 0.1 + 0.1 * size_of(scene.body));
     if (kSanitized) continue;  // the rest is of the end
     EXPECT_LT(deepest_place(scene, end), 0.02 * size_of(scene.body));

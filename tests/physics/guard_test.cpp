@@ -91,7 +91,7 @@ TYPED_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
   const BodyOf<Dim> body = four_legged<Dim>();
   const SceneOf<Dim> scene = scene_of(body, soles(body));
   const std::function<Termination(StateOf<Dim>&)> spoils[] = {
-      [](StateOf<Dim>& state) { return state.v *= 4, Termination::kDone; },
+      [](StateOf<Dim>& state) { return state.v.array() += 30, Termination::kDone; },
       [&](StateOf<Dim>& state) {
         const VectorOf<Dim> across = state.x.col(body.tets(1, 0)) - state.x.col(body.tets(0, 0));
         state.x.col(body.tets(0, 0)) += 2 * across;
@@ -103,7 +103,7 @@ TYPED_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
     int steps = 0;
     const auto in_the_fifth = [&](StateOf<Dim>& state) { return ++steps == 5 ? spoil(state) : Termination::kDone; };
     const std::unique_ptr<StepperOf<Dim>> stepper =
-        make_guarded_stepper<Dim>(scene, std::make_unique<Spoilt<Dim>>(scene, in_the_fifth));
+        make_guarded_stepper<Dim>(scene, std::make_unique<Spoilt<Dim>>(scene, in_the_fifth), 8);
     ImpulsesOf<Dim> impulses = make_impulses(scene);
     StateOf<Dim> state = laid_down(scene, 0.001);
     state.v.row(1).setConstant(-1);

@@ -19,14 +19,23 @@ struct CaseName {
 };
 /// Every method in both dimensions.
 using Cases = testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kImplicit>,
-                             Case<3, Method::kImplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>>;
+                             Case<3, Method::kImplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>,
+                             Case<2, Method::kXpbd>, Case<3, Method::kXpbd>, Case<2, Method::kSpring>, Case<3, Method::kSpring>>;
+
+/// For drafts: as stable as the others, but its elasticity is not to be trusted to a few percent.
+inline bool is_draft(Method method) { return method == Method::kXpbd || method == Method::kSpring; }
+
+/// Change of the velocity of the centre of mass that nothing booked explains [m/s].
+inline double linear_tolerance(Method method) { return method == Method::kXpbd ? 1e-6 : 1e-9; }
 
 /// What the method may lose of angular momentum in a step of a body about a metre long, over its mass [m2/s].
 inline double angular_tolerance(Method method) {
   switch (method) {
     case Method::kExplicit: return 1e-12;  // rounding
     case Method::kImplicit: return 1e-6;   // what its solver leaves
-    case Method::kEuler: break;
+    case Method::kSpring: return 1e-12;
+    case Method::kEuler:
+    case Method::kXpbd: break;
   }
   return std::numeric_limits<double>::infinity();  // its own, told in its header
 }

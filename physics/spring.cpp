@@ -1,0 +1,63 @@
+#include "physics/element_constraint.h"
+#include "physics/stepper.h"
+
+namespace hydrostat::physics {
+namespace {
+
+/// The same scene with a body that is springs and dashpots along its edges, and nothing else. An element's pairs get springs
+/// that together hold as much as it (make_body's rule, shared out over its pairs): Poisson's ratio is that of central forces.
+template <int Dim>
+SceneOf<Dim> springs_alone(const SceneOf<Dim>& scene) {
+  SceneOf<Dim> result = scene;
+  BodyOf<Dim>& body = result.body;
+  body.volume_stiffness.resize(0);
+  body.elements.clear();
+  for (const BodyElements<Dim>& elements : scene.body.elements) {
+    const Eigen::MatrixXi& edges = elements.fit.of_element;
+    for (Eigen::Index e = 0; e < edges.cols(); ++e) {
+      const double modulus = youngs_modulus_times_volume(elements.block, static_cast<int>(e));
+      for (Eigen::Index p = 0; p < edges.rows(); ++p) {
+        const double length = body.rest_length[edges(p, e)];
+        body.edge_stiffness[edges(p, e)] += kEdgesPerTet<Dim> * modulus / (static_cast<double>(edges.rows()) * length * length);
+      }
+    }
+  }
+  return result;
+}
+
+/// Springs and dashpots along edges, stepped like the explicit method: the cheapest of all, for drafts.
+///
+/// Linear and angular momentum change by the booked impulses alone, to rounding. Volumes and elements are left out, so that
+/// nothing but the springs' own stiffness resists a change of volume: a strongly loaded tet may turn inside out and stay so.
+template <int Dim>
+class SpringStepper final : public StepperOf<Dim> {
+ public:
+  explicit SpringStepper(const SceneOf<Dim>& scene)
+      : scene_(scene), springs_(springs_alone(scene)), stepper_(make_explicit_stepper(springs_)) {}
+
+  double substep(double dt) const override { return stepper_->substep(dt); }
+
+  Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
+                   ImpulsesOf<Dim>& impulses) override {
+    for (std::size_t n = 0; n < springs_.obstacles.size(); ++n) {  // their owner may have changed them
+      springs_.obstacles[n].velocity = scene_.obstacles[n].velocity;
+    }
+    return stepper_->step(dt, activation, effect_force, state, impulses);
+  }
+
+ private:
+  const SceneOf<Dim>& scene_;
+  SceneOf<Dim> springs_;
+  std::unique_ptr<StepperOf<Dim>> stepper_;
+};
+
+}  // namespace
+
+template <int Dim>
+std::unique_ptr<StepperOf<Dim>> make_spring_stepper(const SceneOf<Dim>& scene) {
+  return std::make_unique<SpringStepper<Dim>>(scene);
+}
+template std::unique_ptr<StepperOf<2>> make_spring_stepper<2>(const SceneOf<2>&);
+template std::unique_ptr<StepperOf<3>> make_spring_stepper<3>(const SceneOf<3>&);
+
+}  // namespace hydrostat::physics

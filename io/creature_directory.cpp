@@ -28,7 +28,7 @@ Error directory_error(const fs::path& shown_as, int error_number) {
           mend_of_write_error(error_number)};
 }
 
-std::string part_prefix(const fs::path& creature) { return "." + creature.filename().string() + ".part-"; }
+std::string part_prefix(const fs::path& creature) { return std::string(".").append(creature.filename().string()).append(".part-"); }
 
 /// The creature's path without symbolic links and trailing slashes, so that its parent and name are what they are on the
 /// disk.

@@ -2,8 +2,10 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <iostream>
 #include <memory>
+#include <thread>
 
 #include "cli/command_line.h"
 #include "cli/number_option.h"
@@ -29,7 +31,7 @@ struct SimulateCommand {
   double duration = 0, trace_rate = 0;
   unsigned seed = 0;
   bool seed_is_given = false, json = false, quiet = false;
-  int threads = 1;
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 };
 
 /// How many steps a row of the trace spans.
@@ -81,6 +83,7 @@ void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& sc
   report.source.root_motion = "none";
   report.body.nodes = body.node_count();
   report.body.elements = body.tet_count();
+  if (!body.elements.empty()) report.body.elements = body.elements.front().block.element_count();
   report.body.constraints = body.edge_count();
   report.body.vertices = scenario.scene.contact_points.count();
   report.body.mass_kg = body.mass.sum();
@@ -92,7 +95,6 @@ void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& sc
   report.accuracy.method = physics::name_of(options.method);
   report.accuracy.element = scene.element;
   report.accuracy.dt_s = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
-  report.accuracy.estimated_error_length = retarget::substep_error(scenario, options);
 }
 
 io::CreatureRecord record_of(const io::SceneFile& scene, const retarget::RunReport& report) {
@@ -101,6 +103,8 @@ io::CreatureRecord record_of(const io::SceneFile& scene, const retarget::RunRepo
   record.source_sha256 = scene.sha256;
   record.settings = {{"kind", std::string("scene")},
                      {"method", physics::name_of(scene.method)},
+                     {"element", scene.element},
+                     {"law", scene.law},
                      {"dt_s", scene.dt_s},
                      {"duration_s", scene.duration_s},
                      {"seed", static_cast<std::int64_t>(scene.seed)}};
@@ -153,9 +157,13 @@ int simulate(const SimulateCommand& command) {
       [&](const auto& scenario) {
         const auto& body = scenario.scene.body;
         refuse_large_trace(command, options, body.node_count(), body.edge_count());
+        // A second thread measures the error meanwhile; without one it is done when it is asked for.
+        std::future<double> error = std::async(command.threads > 1 ? std::launch::async : std::launch::deferred,
+                                               [&] { return retarget::substep_error(scenario, options); });
         retarget::Simulation run = stages.run("simulation", [&] { return retarget::simulate(scenario, options); });
         stages.run("measurement", [&] {
           fill_report(scene, scenario, options, report);
+          report.accuracy.estimated_error_length = error.get();
           return 0;
         });
         return run;

@@ -152,6 +152,7 @@ void fill(Group& group, const retarget::SimulationReport& simulation) {
   group.add("penetration_max_size", simulation.penetration_max_size);
   group.add("inverted_elements", simulation.inverted_elements);
   group.add("inverted_elements_end", simulation.inverted_elements_end);
+  group.add("guard_steps", simulation.guard_steps);
   group.add("travel_length", simulation.travel_length);
   group.add("speed_max_m_s", simulation.speed_max_m_s);
   group.add("speed_end_m_s", simulation.speed_end_m_s);

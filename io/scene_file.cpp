@@ -6,6 +6,7 @@
 #include "io/fingerprint.h"
 #include "io/scene_shapes.h"
 #include "io/toml_reader.h"
+#include "physics/element_body.h"
 
 namespace hydrostat::io {
 namespace {
@@ -19,6 +20,8 @@ constexpr double kSteepest = 80;             // [deg] of the ground
 constexpr double kMostActivation = 0.95;     // of all waves on one constraint: 1 would let it vanish
 constexpr double kLeastPoissonsRatio = 0.25; // of springs
 constexpr double kFriction = 0.8;
+const std::string kSprings = "springs";
+const std::vector<std::string> kLaws{kSprings, "stable_neo_hookean", "corotated_linear"};
 constexpr Within kFrictionRange{.least = 0, .most = 10};
 
 /// Reads the tables of one scene into a scenario.
@@ -30,11 +33,12 @@ class SceneReader {
   ScenarioOf<Dim> read() {
     const std::optional<TomlReader> body = root_.table("body");
     if (!body) throw root_.refusal("", "there is no [body]", "Add [body] with shape = \"...\".");
-    mesh_ = body_mesh<Dim>(*body, scene_.shape, scene_.warnings);
+    mesh_ = body_mesh<Dim>(*body, scene_.shape, scene_.element, scene_.warnings);
     read_material();
     for (const TomlReader& wave : root_.tables("activation")) read_wave(wave);
     refuse_vanishing();
     read_surroundings();
+    for (const TomlReader& clamp : root_.tables("clamp")) read_clamp(clamp);
     place(*body);
     physics::touch_with_whole_surface(scenario_.scene);
     for (const TomlReader& push : root_.tables("push")) read_push(push);
@@ -53,40 +57,62 @@ class SceneReader {
     material.youngs_modulus = table.number_or("youngs_modulus_pa", otherwise.youngs_modulus, kAboveZero);
     constexpr Within kRange{.least = 0, .most = 0.5, .without_most = true};
     material.poissons_ratio = table.number_or("poissons_ratio", otherwise.poissons_ratio, kRange);
-    if (material.poissons_ratio < kLeastPoissonsRatio) {
-      throw table.refusal("poissons_ratio", "springs alone have a Poisson's ratio of 0.25", "Give 0.25 or more, below 0.5.");
+    if (scene_.law == kSprings && material.poissons_ratio < kLeastPoissonsRatio) {
+      throw table.refusal("poissons_ratio", "springs alone have a Poisson's ratio of 0.25", "Give 0.25 or more, or another law.");
     }
     return material;
   }
 
   void read_material() {
-    std::vector<physics::ElementMaterial> materials{{}};
+    physics::ElementMaterial most;
     double damping_time = physics::Material{}.damping_time;
+    scene_.law = kLaws.front();
     if (const std::optional<TomlReader> table = root_.table("material")) {
-      table->choice_or_first("law", {"springs"});
-      materials[0] = material_of(*table, {});
+      scene_.law = table->choice_or_first("law", kLaws);
+      most = material_of(*table, most);
       damping_time = table->number_or("damping_time_s", damping_time, kNotNegative);
       table->refuse_others();
     }
-    PointsOf<Dim> middles = PointsOf<Dim>::Zero(Dim, mesh_.simplices.cols());
-    for (Eigen::Index t = 0; t < middles.cols(); ++t) {
-      for (int k = 0; k <= Dim; ++k) middles.col(t) += mesh_.nodes.col(mesh_.simplices(k, t)) / (Dim + 1);
+    const bool of_boxes = mesh_.nodes.rows() != Dim + 1;
+    if (scene_.law == kSprings && of_boxes) {
+      throw root_.refusal("material", "springs need " + std::string(Dim == 3 ? "tets" : "triangles"), "Give another law, or leave 'element' out.");
     }
-    Eigen::VectorXi material_of_simplex = Eigen::VectorXi::Zero(middles.cols());
+    PointsOf<Dim> middles(Dim, mesh_.nodes.cols());
+    for (Eigen::Index t = 0; t < middles.cols(); ++t) middles.col(t) = mesh_.rest(Eigen::all, mesh_.nodes.col(t)).rowwise().mean();
+    mesh_.materials.assign(static_cast<std::size_t>(mesh_.nodes.cols()), most);
     for (const TomlReader& region : root_.tables("region")) {
-      materials.push_back(material_of(region, materials[0]));
+      const physics::ElementMaterial material = material_of(region, most);
       const std::vector<char> within = points_within<Dim>(region, middles);
       for (std::size_t t = 0; t < within.size(); ++t) {
-        if (within[t]) material_of_simplex[static_cast<Eigen::Index>(t)] = static_cast<int>(materials.size()) - 1;
+        if (within[t]) mesh_.materials[t] = material;
       }
       region.refuse_others();
     }
-    scenario_.scene.body = retarget::make_spring_body<Dim>(mesh_, materials, material_of_simplex, damping_time);
-    for (const physics::ElementMaterial& material : materials) {
+    const std::string broken = physics::broken_rule(mesh_);
+    if (!broken.empty()) throw root_.refusal("body", broken, "Give other sizes, more 'nodes' or a smaller 'cell_size_m'.");
+    if (scene_.law == kSprings) {
+      scenario_.scene.body = retarget::make_spring_body<Dim>(mesh_, damping_time);
+    } else {
+      const physics::ElasticLaw law =
+          scene_.law == "stable_neo_hookean" ? physics::ElasticLaw::kStableNeoHookean : physics::ElasticLaw::kCorotatedLinear;
+      scenario_.scene.body = physics::make_body<Dim>(mesh_, physics::ElementBodyOptions{law, 0, damping_time});
+    }
+    for (const physics::ElementMaterial& material : mesh_.materials) {
       scenario_.youngs_modulus = std::max(scenario_.youngs_modulus, material.youngs_modulus);
     }
-    scenario_.length = (mesh_.nodes.rowwise().maxCoeff() - mesh_.nodes.rowwise().minCoeff()).maxCoeff();
+    scenario_.length = (mesh_.rest.rowwise().maxCoeff() - mesh_.rest.rowwise().minCoeff()).maxCoeff();
     scenario_.size = physics::size_of_volume<Dim>(scenario_.scene.body.rest_volume.sum());
+  }
+
+  void read_clamp(const TomlReader& table) {
+    retarget::Clamp clamp;
+    clamp.until_s = table.number_or("until_s", clamp.until_s, kAboveZero);
+    const std::vector<char> within = points_within<Dim>(table, mesh_.rest);
+    for (std::size_t n = 0; n < within.size(); ++n) {
+      if (within[n]) clamp.nodes.push_back(static_cast<int>(n));
+    }
+    table.refuse_others();
+    scenario_.clamps.push_back(std::move(clamp));
   }
 
   VectorOf<Dim> direction(const TomlReader& table, const std::string& key) const {
@@ -105,14 +131,14 @@ class SceneReader {
     wave.from_s = table.number_or("from_s", 0, kNotNegative);
     wave.until_s = table.number_or("until_s", wave.until_s, {.least = wave.from_s, .without_least = true});
     PointsOf<Dim> middles(Dim, body.edge_count());
-    for (int e = 0; e < body.edge_count(); ++e) middles.col(e) = (mesh_.nodes.col(body.edges(0, e)) + mesh_.nodes.col(body.edges(1, e))) / 2;
+    for (int e = 0; e < body.edge_count(); ++e) middles.col(e) = (mesh_.rest.col(body.edges(0, e)) + mesh_.rest.col(body.edges(1, e))) / 2;
     const std::vector<char> within = points_within<Dim>(table, middles);
     wave.share = Eigen::VectorXd::Zero(body.edge_count());
     for (int e = 0; e < body.edge_count(); ++e) wave.share[e] = within[static_cast<std::size_t>(e)];
     if (table.has("axis")) {
       const VectorOf<Dim> axis = direction(table, "axis");
       for (int e = 0; e < body.edge_count(); ++e) {
-        const VectorOf<Dim> span = mesh_.nodes.col(body.edges(1, e)) - mesh_.nodes.col(body.edges(0, e));
+        const VectorOf<Dim> span = mesh_.rest.col(body.edges(1, e)) - mesh_.rest.col(body.edges(0, e));
         wave.share[e] *= std::pow(axis.dot(span.normalized()), 2);  // what a stretch along the axis does to the constraint
       }
     }
@@ -182,7 +208,7 @@ class SceneReader {
     physics::SceneOf<Dim>& scene = scenario_.scene;
     physics::StateOf<Dim>& start = scenario_.start;
     const physics::BlockOf<Dim> turn = rotation_of<Dim>(body);
-    scene.body.rest = (turn * mesh_.nodes).colwise() + vector_or_zero(body, "position_m");
+    scene.body.rest = (turn * mesh_.rest).colwise() + vector_or_zero(body, "position_m");
     if (body.has("gap_m")) {
       if (!scene.has_ground) throw body.refusal("gap_m", "there is no ground to keep a gap from", "Add [ground], or leave 'gap_m' out.");
       const double lowest = (scene.ground.normal.transpose() * scene.body.rest).minCoeff();
@@ -199,6 +225,8 @@ class SceneReader {
     const VectorOf<Dim> velocity = vector_or_zero(body, "velocity_m_s"), centre = physics::centre_of_mass(scene.body, start.x);
     start.v = velocity.replicate(1, start.x.cols());
     for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += spin_velocity(body, start.x.col(i) - centre);
+    retarget::hold_at(scenario_.clamps, 0, scene.body.held);
+    for (const int node : scene.body.held) start.v.col(node).setZero();
   }
 
   static VectorOf<Dim> spin_velocity(const TomlReader& body, const VectorOf<Dim>& arm) {
@@ -225,7 +253,7 @@ class SceneReader {
  private:
   const TomlReader& root_;
   SceneFile& scene_;
-  physics::SimplexMeshOf<Dim> mesh_;  // the rest shape in its own frame
+  physics::ElementMesh<Dim> mesh_;  // the rest shape in its own frame
   ScenarioOf<Dim> scenario_;
   Eigen::VectorXd most_activation_;  // E
   bool is_distorted_ = false;
@@ -235,7 +263,6 @@ template <int Dim>
 void read_in_dimension(const TomlReader& root, SceneFile& scene) {
   SceneReader<Dim> reader(root, scene);
   scene.scenario = reader.read();
-  scene.element = Dim == 3 ? "tet" : "triangle";
   const std::optional<physics::Method> method = method_named(root.choice_or_first("method", method_names()));
   scene.method = method ? *method : reader.is_distorted() ? physics::Method::kEuler : physics::Method::kExplicit;
 }
@@ -256,7 +283,7 @@ SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsig
   const toml::table table = parse_toml(file);
   const TomlReader root(table, file, "");
   for (const char* key : {"dimension", "dt_s", "duration_s", "seed", "method", "gravity_m_s2", "body", "material", "region", "ground",
-                          "obstacle", "activation", "push"}) {
+                          "obstacle", "clamp", "activation", "push"}) {
     root.has(key);
   }
   root.refuse_others();

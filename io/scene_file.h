@@ -15,7 +15,8 @@ struct SceneFile {
   std::string file, sha256;
   std::variant<retarget::ScenarioOf<2>, retarget::ScenarioOf<3>> scenario;
   std::string shape;    // as the file calls the body's
-  std::string element;  // "tet" or "triangle"
+  std::string element;  // "tet", "hex", "triangle" or "quad"
+  std::string law;      // "springs", "stable_neo_hookean" or "corotated_linear"
   physics::Method method = physics::Method::kExplicit;
   double dt_s = 1.0 / 240, duration_s = 2;
   unsigned seed = 0;

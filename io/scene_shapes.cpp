@@ -56,8 +56,9 @@ void refuse_too_many(const TomlReader& body, double nodes) {
   throw body.refusal("cell_size_m", "so small cells make more than " + std::to_string(kMostNodes) + " nodes", "Give a larger 'cell_size_m'.");
 }
 
+/// How many cells a box has along each axis.
 template <int Dim>
-SimplexMeshOf<Dim> box(const TomlReader& body, const VectorOf<Dim>& size) {
+Eigen::Matrix<int, Dim, 1> cells_of_box(const TomlReader& body, const VectorOf<Dim>& size) {
   const Fineness fineness = fineness_of<Dim>(body);
   const auto cells_at = [&](double cell) -> Eigen::Matrix<int, Dim, 1> {
     return (size / cell).array().round().max(1).min(1e5).template cast<int>();
@@ -69,7 +70,7 @@ SimplexMeshOf<Dim> box(const TomlReader& body, const VectorOf<Dim>& size) {
     while (nodes_at(cell) < 0.9 * static_cast<double>(fineness.nodes)) cell *= 0.99;
   }
   refuse_too_many(body, nodes_at(cell));
-  return physics::mesh_of_box<Dim>(size, cells_at(cell));
+  return cells_at(cell);
 }
 
 template <int Dim>
@@ -215,9 +216,12 @@ ClosedMeshOf<Dim> surface_of(const TomlReader& table) {
 }
 
 template <int Dim>
-SimplexMeshOf<Dim> body_mesh(const TomlReader& body, std::string& shape, std::vector<std::string>& warnings) {
+physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, std::string& element,
+                                    std::vector<std::string>& warnings) {
   shape = Dim == 3 ? body.choice("shape", {"cube", "bar", "sphere", "tetrahedron", "pyramid", "mesh"})
                    : body.choice("shape", {"square", "bar", "circle", "triangle", "pyramid", "outline"});
+  element = body.choice_or_first("element", Dim == 3 ? std::vector<std::string>{"tet", "hex"} : std::vector<std::string>{"triangle", "quad"});
+  const bool of_boxes = element == "hex" || element == "quad";
   const auto size = [&]() -> VectorOf<Dim> { return body.number_or_numbers("size_m", Dim, kAboveZero); };
   SimplexMeshOf<Dim> mesh;
   if (shape == "sphere" || shape == "circle") {
@@ -228,11 +232,16 @@ SimplexMeshOf<Dim> body_mesh(const TomlReader& body, std::string& shape, std::ve
     mesh = pyramid<Dim>(body, size());
   } else if (shape == "mesh" || shape == "outline") {
     mesh = inside<Dim>(body, warnings);
-  } else if (shape == "bar") {
-    mesh = box<Dim>(body, body.numbers("size_m", Dim, kAboveZero));
   } else {
-    mesh = box<Dim>(body, size());
+    const VectorOf<Dim> extents = shape == "bar" ? VectorOf<Dim>(body.numbers("size_m", Dim, kAboveZero)) : size();
+    const Eigen::Matrix<int, Dim, 1> cells = cells_of_box<Dim>(body, extents);
+    if (of_boxes) {
+      const physics::BoxMeshOf<Dim> lattice = physics::lattice_of_box<Dim>(extents, cells);
+      return {lattice.nodes, lattice.boxes, {}, Eigen::VectorXd::Ones(lattice.boxes.cols())};
+    }
+    mesh = physics::mesh_of_box<Dim>(extents, cells);
   }
+  if (of_boxes) throw body.refusal("element", "only boxes can be cut into such elements, not a " + shape, "Leave 'element' out.");
   const double quality = physics::shape_qualities(mesh).minCoeff();
   if (!(quality > kLeastQuality)) {
     throw body.refusal("shape", "the mesh has slivers: the flattest element has " + std::to_string(quality) + " of a regular one's volume",
@@ -241,7 +250,7 @@ SimplexMeshOf<Dim> body_mesh(const TomlReader& body, std::string& shape, std::ve
   if (const int pieces = count_pieces(mesh); pieces > 1) {
     throw body.refusal("shape", "the mesh falls into " + std::to_string(pieces) + " pieces", kSmallerCells);
   }
-  return mesh;
+  return {mesh.nodes, mesh.simplices, {}, Eigen::VectorXd::Ones(mesh.simplices.cols())};
 }
 
 template <int Dim>
@@ -273,7 +282,8 @@ std::vector<char> points_within(const TomlReader& table, const PointsOf<Dim>& po
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                          \
   template BlockOf<Dim> rotation_of<Dim>(const TomlReader&);                                                \
   template ClosedMeshOf<Dim> surface_of<Dim>(const TomlReader&);                                            \
-  template SimplexMeshOf<Dim> body_mesh<Dim>(const TomlReader&, std::string&, std::vector<std::string>&);   \
+  template physics::ElementMesh<Dim> body_mesh<Dim>(const TomlReader&, std::string&, std::string&,          \
+                                                    std::vector<std::string>&);                             \
   template std::vector<char> points_within<Dim>(const TomlReader&, const PointsOf<Dim>&);
 HYDROSTAT_INSTANTIATE(2)
 HYDROSTAT_INSTANTIATE(3)

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "io/toml_reader.h"
+#include "physics/element_block.h"
 #include "physics/simplex_mesh.h"
 
 namespace hydrostat::io {
@@ -19,10 +20,12 @@ physics::BlockOf<Dim> rotation_of(const TomlReader& table);
 template <int Dim>
 physics::ClosedMeshOf<Dim> surface_of(const TomlReader& table);
 
-/// The rest shape of [body] in its own frame. `shape` becomes its name, `warnings` receives what the mesh departs in.
-/// Throws Error where the shape is not told as it must be, gives slivers or falls into pieces.
+/// The rest shape of [body] in its own frame, without materials. `shape` and `element` become their names ("sphere", "tet"),
+/// `warnings` receives what the mesh departs in. Throws Error where the shape is not told as it must be, gives slivers or falls
+/// into pieces.
 template <int Dim>
-physics::SimplexMeshOf<Dim> body_mesh(const TomlReader& body, std::string& shape, std::vector<std::string>& warnings);
+physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, std::string& element,
+                                    std::vector<std::string>& warnings);
 
 /// Which points (Dim x P, in the body's own frame) lie in the part that `table` names: `box_m`, or `normal` with `offset_m`; all
 /// where it names none. Throws Error where no point does.

@@ -80,9 +80,11 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
   std::string nearest;
   std::size_t least = word.size() / 2 + 1;
   for (const std::string& other : known) {
-    // A key that lacks its unit, or has another, means the one that begins alike.
-    const bool begins_alike = std::min(word.size(), other.size()) > 3 && (other.starts_with(word + "_") || word.starts_with(other + "_"));
-    const std::size_t changes = begins_alike ? 1 : changes_between(word, other);
+    // What lacks its unit or its first word, or has one too many, means the one that is alike otherwise.
+    const auto lacks_a_word = [](const std::string& part, const std::string& whole) {
+      return part.size() > 3 && (whole.starts_with(part + "_") || whole.ends_with("_" + part));
+    };
+    const std::size_t changes = lacks_a_word(word, other) || lacks_a_word(other, word) ? 1 : changes_between(word, other);
     if (changes < least) nearest = other, least = changes;
   }
   return nearest;

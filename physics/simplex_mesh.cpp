@@ -124,6 +124,32 @@ SimplexMeshOf<Dim> mesh_of_box(const VectorOf<Dim>& size, const Eigen::Matrix<in
 }
 
 template <int Dim>
+BoxMeshOf<Dim> lattice_of_box(const VectorOf<Dim>& size, const Eigen::Matrix<int, Dim, 1>& cells) {
+  const VectorOf<Dim> step = size.cwiseQuotient(cells.template cast<double>());
+  const auto number = [&](const Index<Dim>& place) {
+    int n = 0;
+    for (int d = Dim - 1; d >= 0; --d) n = n * (cells[d] + 1) + place[d];
+    return n;
+  };
+  BoxMeshOf<Dim> mesh;
+  mesh.nodes.resize(Dim, (cells.array() + 1).prod());
+  mesh.boxes.resize(1 << Dim, cells.prod());
+  for_each_cell<Dim>(cells.array() + 1, [&](const Index<Dim>& place) {
+    mesh.nodes.col(number(place)) = step.cwiseProduct(place.template cast<double>()) - size / 2;
+  });
+  int c = 0;
+  for_each_cell<Dim>(cells, [&](const Index<Dim>& cell) {
+    for (int corner = 0; corner < 1 << Dim; ++corner) {
+      Index<Dim> place = cell;
+      for (int d = 0; d < Dim; ++d) place[d] += corner >> d & 1;
+      mesh.boxes(corner, c) = number(place);
+    }
+    ++c;
+  });
+  return mesh;
+}
+
+template <int Dim>
 SimplexMeshOf<Dim> mesh_of_ball(double diameter, int cells) {
   PointsOf<Dim> places;
   // The diagonals run outward, so that no simplex has all of its corners on the surface.
@@ -260,6 +286,7 @@ Eigen::VectorXd shape_qualities(const SimplexMeshOf<Dim>& mesh) {
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                                     \
   template SimplexMeshOf<Dim> mesh_of_box<Dim>(const VectorOf<Dim>&, const Eigen::Matrix<int, Dim, 1>&);               \
+  template BoxMeshOf<Dim> lattice_of_box<Dim>(const VectorOf<Dim>&, const Eigen::Matrix<int, Dim, 1>&);                \
   template SimplexMeshOf<Dim> mesh_of_ball<Dim>(double, int);                                                          \
   template SimplexMeshOf<Dim> refined<Dim>(const SimplexMeshOf<Dim>&, int);                                            \
   template SimplexMeshOf<Dim> mesh_of_regular_simplex<Dim>(double, int);                                               \

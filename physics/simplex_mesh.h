@@ -15,6 +15,15 @@ struct SimplexMeshOf {
 template <int Dim>
 SimplexMeshOf<Dim> mesh_of_box(const VectorOf<Dim>& size, const Eigen::Matrix<int, Dim, 1>& cells);
 
+/// The lattice of such a box, its cells whole: bit d of a node's number in its cell is its coordinate d.
+template <int Dim>
+struct BoxMeshOf {
+  PointsOf<Dim> nodes;                                   // [m] Dim x N
+  Eigen::Matrix<int, (1 << Dim), Eigen::Dynamic> boxes;  // 2^Dim x C
+};
+template <int Dim>
+BoxMeshOf<Dim> lattice_of_box(const VectorOf<Dim>& size, const Eigen::Matrix<int, Dim, 1>& cells);
+
 /// A ball (disc) about the origin with `cells` (> 1) from side to side. Its nodes lie on spheres; the outermost is a little
 /// larger than the ball, so that the volume is the ball's.
 template <int Dim>

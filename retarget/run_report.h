@@ -70,6 +70,7 @@ struct SimulationReport {
   double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
   double volume_error_max = 0, volume_error_end = 0, penetration_max_size = 0;
   int inverted_elements = 0, inverted_elements_end = 0;  // the most in any step; at the end
+  int guard_steps = 0;                                   // in which another method took over
   double travel_length = 0;  // of the COM over the ground's plane
   double speed_max_m_s = 0, speed_end_m_s = 0;  // of the fastest node
   double ms_per_sim_s = 0, real_time_factor = 0;

@@ -1,5 +1,6 @@
 #include "retarget/scenario.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -18,18 +19,29 @@ physics::Material spring_material(const physics::ElementMaterial& material, doub
 }
 
 template <int Dim>
-physics::BodyOf<Dim> make_spring_body(const physics::SimplexMeshOf<Dim>& mesh,
-                                      const std::vector<physics::ElementMaterial>& materials,
-                                      const Eigen::VectorXi& material_of, double damping_time) {
-  const Eigen::Matrix2Xi edges = physics::edges_of(mesh);
-  physics::BodyOf<Dim> body;
+physics::BodyOf<Dim> make_spring_body(const physics::ElementMesh<Dim>& mesh, double damping_time) {
+  const physics::SimplexMeshOf<Dim> simplices{mesh.rest, mesh.nodes};
+  const Eigen::Matrix2Xi edges = physics::edges_of(simplices);
+  const auto& materials = mesh.materials;
   // All that a body is made of adds up over its simplices, so that it is the sum of one body a material.
-  for (std::size_t m = 0; m < materials.size(); ++m) {
-    const Eigen::VectorXd fill = (material_of.array() == static_cast<int>(m)).template cast<double>();
-    const physics::BodyOf<Dim> part =
-        physics::make_body<Dim>(mesh.nodes, mesh.simplices, edges, fill, spring_material<Dim>(materials[m], damping_time));
-    if (m == 0) {
-      body = part;
+  std::vector<std::size_t> firsts;
+  const auto is_alike = [&](std::size_t a, std::size_t b) {
+    return materials[a].density == materials[b].density && materials[a].youngs_modulus == materials[b].youngs_modulus &&
+           materials[a].poissons_ratio == materials[b].poissons_ratio;
+  };
+  for (std::size_t t = 0; t < materials.size(); ++t) {
+    if (std::none_of(firsts.begin(), firsts.end(), [&](std::size_t first) { return is_alike(first, t); })) firsts.push_back(t);
+  }
+  physics::BodyOf<Dim> body;
+  for (const std::size_t first : firsts) {
+    Eigen::VectorXd fill = mesh.fill;
+    for (std::size_t t = 0; t < materials.size() && materials.size() > 1; ++t) {
+      if (!is_alike(first, t)) fill[static_cast<Eigen::Index>(t)] = 0;
+    }
+    physics::BodyOf<Dim> part = physics::make_body<Dim>(mesh.rest, simplices.simplices, edges, fill,
+                                                        spring_material<Dim>(materials[first], damping_time));
+    if (first == firsts.front()) {
+      body = std::move(part);
       continue;
     }
     body.mass += part.mass;
@@ -38,6 +50,15 @@ physics::BodyOf<Dim> make_spring_body(const physics::SimplexMeshOf<Dim>& mesh,
     body.volume_stiffness += part.volume_stiffness;
   }
   return body;
+}
+
+void hold_at(const std::vector<Clamp>& clamps, double time_s, std::vector<int>& held) {
+  held.clear();
+  for (const Clamp& clamp : clamps) {
+    if (time_s < clamp.until_s) held.insert(held.end(), clamp.nodes.begin(), clamp.nodes.end());
+  }
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
 }
 
 void activations_at(const std::vector<Wave>& waves, double time_s, Eigen::VectorXd& activation) {
@@ -77,9 +98,7 @@ void distort(StartShape shape, unsigned seed, physics::PointsOf<Dim>& x) {
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                                      \
   template physics::Material spring_material<Dim>(const physics::ElementMaterial&, double);                             \
-  template physics::BodyOf<Dim> make_spring_body<Dim>(const physics::SimplexMeshOf<Dim>&,                               \
-                                                      const std::vector<physics::ElementMaterial>&,                     \
-                                                      const Eigen::VectorXi&, double);                                  \
+  template physics::BodyOf<Dim> make_spring_body<Dim>(const physics::ElementMesh<Dim>&, double);                         \
   template void distort<Dim>(StartShape, unsigned, physics::PointsOf<Dim>&);
 HYDROSTAT_INSTANTIATE(2)
 HYDROSTAT_INSTANTIATE(3)

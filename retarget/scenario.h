@@ -34,6 +34,12 @@ struct MoveOf {
   physics::VectorOf<Dim> velocity = physics::VectorOf<Dim>::Zero();  // [m/s]
 };
 
+/// Nodes that stay where they start until they are let go.
+struct Clamp {
+  std::vector<int> nodes;
+  double until_s = 1e300;
+};
+
 /// A body and all that happens to it: what a simulation without a clip starts from.
 template <int Dim>
 struct ScenarioOf {
@@ -42,6 +48,7 @@ struct ScenarioOf {
   std::vector<Wave> waves;
   std::vector<PushOf<Dim>> pushes;
   std::vector<MoveOf<Dim>> moves;
+  std::vector<Clamp> clamps;  // those that hold at the start are the scene's body's `held`
   double length = 1, size = 1;  // L [m], longest extent of the rest shape's box; D [m]
   double youngs_modulus = 0;    // [Pa] of the stiffest region
 };
@@ -51,11 +58,12 @@ struct ScenarioOf {
 template <int Dim>
 physics::Material spring_material(const physics::ElementMaterial& material, double damping_time);
 
-/// The body of a mesh whose simplex t is made of materials[material_of[t]].
+/// The body of springs of a mesh of simplices; its materials are one for all or one for each.
 template <int Dim>
-physics::BodyOf<Dim> make_spring_body(const physics::SimplexMeshOf<Dim>& mesh,
-                                      const std::vector<physics::ElementMaterial>& materials,
-                                      const Eigen::VectorXi& material_of, double damping_time);
+physics::BodyOf<Dim> make_spring_body(const physics::ElementMesh<Dim>& mesh, double damping_time);
+
+/// Makes `held` what the clamps hold at a time [s]: in ascending order, each once.
+void hold_at(const std::vector<Clamp>& clamps, double time_s, std::vector<int>& held);
 
 /// The activations at a time [s]: 1 plus all waves. Allocates nothing once `activation` has its size.
 void activations_at(const std::vector<Wave>& waves, double time_s, Eigen::VectorXd& activation);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "physics/elastic_forces.h"
+#include "physics/internal_forces.h"
 #include "retarget/cpu_seconds.h"
 
 namespace hydrostat::retarget {
@@ -100,7 +100,9 @@ class Course {
   };
   Energy energy() const;
   void set_velocities(double begin);
+  void let_go();
   physics::Termination step();
+  SpinOf<Dim> hold_moment() const;
   void measure();
   void write_row(Eigen::Index row);
   void write_frame();
@@ -111,14 +113,17 @@ class Course {
   const SimulationOptions& options_;
   physics::SceneOf<Dim> scene_;  // a copy, whose obstacles change their velocities
   const physics::BodyOf<Dim>& body_;
-  const std::unique_ptr<physics::StepperOf<Dim>> stepper_;
+  std::unique_ptr<physics::StepperOf<Dim>> stepper_;
+  physics::InternalForces<Dim> forces_;
   const long steps_, steps_per_frame_;
   const double mass_, weight_, rest_volume_;
 
   long done_ = 0;
+  long guard_steps_ = 0;    // of steppers before this one
+  double next_release_s_ = 1e300;
   double busy_s_ = 0, work_ = 0, energy_at_start_ = 0;
   physics::StateOf<Dim> state_, before_;
-  Eigen::VectorXd activation_, next_activation_;
+  Eigen::VectorXd activation_;
   physics::ImpulsesOf<Dim> impulses_;
   PointsOf<Dim> effect_;
   RowSums<Dim> sums_;
@@ -137,6 +142,7 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       scene_(scenario.scene),
       body_(scene_.body),
       stepper_(physics::make_stepper(options.method, scene_)),
+      forces_(body_),
       steps_(std::max(1L, std::lround(options.duration_s / options.dt_s))),
       steps_per_frame_(std::max(1L, std::lround(1 / (options.frame_rate_hz * options.dt_s)))),
       mass_(body_.mass.sum()),
@@ -145,11 +151,12 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       state_(scenario.start),
       before_(state_),
       activation_(body_.edge_count()),
-      next_activation_(activation_),
       impulses_(physics::make_impulses(scene_)),
       effect_(Dim, body_.node_count()) {
   if (state_.obstacle_travel.cols() == 0) state_.obstacle_travel.setZero(Dim, static_cast<Eigen::Index>(scene_.obstacles.size()));
   activations_at(scenario.waves, 0.5 * options.dt_s, activation_);
+  forces_.set_activation(activation_);
+  for (const Clamp& clamp : scenario.clamps) next_release_s_ = std::min(next_release_s_, clamp.until_s);
   energy_at_start_ = energy().sum();
   SimulationReport& report = result_.report;
   report.dimension = Dim;
@@ -167,7 +174,7 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
 
 template <int Dim>
 typename Course<Dim>::Energy Course<Dim>::energy() const {
-  return {0.5 * state_.v.colwise().squaredNorm().dot(body_.mass), physics::elastic_energy(body_, state_.x, activation_),
+  return {0.5 * state_.v.colwise().squaredNorm().dot(body_.mass), forces_.elastic_energy(state_.x),
           -scene_.gravity.dot(state_.x * body_.mass)};
 }
 
@@ -182,16 +189,32 @@ void Course<Dim>::set_velocities(double begin) {
   }
 }
 
+/// From here on another scene is stepped, in which fewer nodes are held.
+template <int Dim>
+void Course<Dim>::let_go() {
+  const double now = static_cast<double>(done_) * options_.dt_s;
+  hold_at(scenario_.clamps, now, scene_.body.held);
+  next_release_s_ = 1e300;
+  for (const Clamp& clamp : scenario_.clamps) {
+    if (clamp.until_s > now) next_release_s_ = std::min(next_release_s_, clamp.until_s);
+  }
+  guard_steps_ += stepper_->guard_steps();
+  stepper_ = physics::make_stepper(options_.method, scene_);
+  impulses_ = physics::make_impulses(scene_);
+}
+
 template <int Dim>
 physics::Termination Course<Dim>::step() {
   const double dt = options_.dt_s, begin = static_cast<double>(done_) * dt;
   before_ = state_;
   if (!scenario_.waves.empty()) {
-    activations_at(scenario_.waves, begin + 0.5 * dt, next_activation_);
-    work_ += physics::elastic_energy(body_, state_.x, next_activation_) - physics::elastic_energy(body_, state_.x, activation_);
-    activation_.swap(next_activation_);
+    activations_at(scenario_.waves, begin + 0.5 * dt, activation_);
+    work_ -= forces_.elastic_energy(state_.x);
+    forces_.set_activation(activation_);
+    work_ += forces_.elastic_energy(state_.x);
   }
   set_velocities(begin);
+  if (begin >= next_release_s_) let_go();
   const VectorOf<Dim> pushed = pushed_velocity(scenario_.pushes, begin, begin + dt);
   const bool has_effect = !pushed.isZero(0);
   if (has_effect) effect_ = (pushed / dt) * body_.mass.transpose();
@@ -205,17 +228,28 @@ physics::Termination Course<Dim>::step() {
   return termination;
 }
 
+/// Of what holds the held nodes [N m s], about the world's origin.
+template <int Dim>
+SpinOf<Dim> Course<Dim>::hold_moment() const {
+  SpinOf<Dim> moment = SpinOf<Dim>::Zero();
+  for (std::size_t n = 0; n < body_.held.size(); ++n) {
+    moment += physics::cross<Dim>(state_.x.col(body_.held[n]), impulses_.hold.col(static_cast<Eigen::Index>(n)));
+  }
+  return moment;
+}
+
 template <int Dim>
 void Course<Dim>::measure() {
   SimulationReport& report = result_.report;
   const double dt = options_.dt_s;
   const VectorOf<Dim> change = physics::momentum(body_, state_.v) - physics::momentum(body_, before_.v);
-  const VectorOf<Dim> booked = impulses_.contact_nodes.rowwise().sum() + impulses_.effect_nodes.rowwise().sum() + dt * mass_ * scene_.gravity;
+  const VectorOf<Dim> booked = impulses_.contact_nodes.rowwise().sum() + impulses_.effect_nodes.rowwise().sum() +
+                               impulses_.hold.rowwise().sum() + dt * mass_ * scene_.gravity;
   report.momentum_residual_mg = std::max(report.momentum_residual_mg, (change - booked).norm() / (dt * weight_));
   const VectorOf<Dim> origin = VectorOf<Dim>::Zero();
   const SpinOf<Dim> turn = physics::angular_momentum(body_, state_.x, state_.v, origin) -
                            physics::angular_momentum(body_, before_.x, before_.v, origin) - impulses_.contact_moment -
-                           impulses_.effect_moment - impulses_.gravity_moment;
+                           impulses_.effect_moment - hold_moment() - impulses_.gravity_moment;
   report.angular_residual_mgl = std::max(report.angular_residual_mgl, turn.norm() / (dt * weight_ * scenario_.length));
   report.energy_excess_mgl =
       std::max(report.energy_excess_mgl, (energy().sum() - energy_at_start_ - work_) / (weight_ * scenario_.length));
@@ -229,8 +263,9 @@ void Course<Dim>::measure() {
   if (options_.trace) {
     sums_.contact += impulses_.contact_nodes;
     sums_.effect += impulses_.effect_nodes;
+    for (std::size_t n = 0; n < body_.held.size(); ++n) sums_.effect.col(body_.held[n]) += impulses_.hold.col(static_cast<Eigen::Index>(n));
     sums_.contact_moment += impulses_.contact_moment;
-    sums_.effect_moment += impulses_.effect_moment;
+    sums_.effect_moment += impulses_.effect_moment + hold_moment();
     sums_.activation += activation_;
     if (++sums_.steps == options_.steps_per_row) write_row(done_ / options_.steps_per_row);
   }
@@ -296,6 +331,7 @@ Simulation Course<Dim>::finish() {
   SimulationReport& report = result_.report;
   report.duration_s = static_cast<double>(done_) * options_.dt_s;
   report.energy_end_mgl = energy().sum() / (weight_ * scenario_.length);
+  report.guard_steps = static_cast<int>(guard_steps_ + stepper_->guard_steps());
   report.work_mgl = work_ / (weight_ * scenario_.length);
   const Eigen::Vector3d up = in_space<Dim>(scene_.has_ground ? scene_.ground.normal : VectorOf<Dim>::UnitY());
   const Eigen::Vector3d way = in_space<Dim>(physics::centre_of_mass(body_, state_.x)) - com_.front();

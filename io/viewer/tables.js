@@ -18,7 +18,7 @@ const kNames = {
   energy_start_mgl: 'energy at the start', energy_end_mgl: 'energy at the end', work_mgl: 'work done on the body',
   energy_excess_mgl: 'energy beyond start and work, greatest', volume_error_end: 'volume error at the end',
   travel_length: 'travel of the COM', ms_per_sim_s: 'computing for a second',
-  inverted_elements: 'inverted elements, most', inverted_elements_end: 'inverted elements at the end',
+  inverted_elements: 'inverted elements, most', inverted_elements_end: 'inverted elements at the end', guard_steps: 'steps by the guard',
 };
 
 function element(parent, tag, name, text) {

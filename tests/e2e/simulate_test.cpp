@@ -93,6 +93,24 @@ TEST(Simulate, DiscOfThePlaneFallsFreelyAndBounces) {
             (std::set<std::string>{"creature.toml", "body.json", "replay.glb", "report.json", "report.html"}));
 }
 
+TEST(Simulate, ClampedBarSagsAsBeamsOfItsMaterialDo) {
+  const TemporaryDirectory directory;
+  ASSERT_EQ(simulate(directory.path, scene_of("clamped_bar"), "--trace trace").exit_code, 0);
+  expect_sound(audit_trace(directory.path / "trace", directory.path / "out"));
+  const auto position = io::read_npy_double(directory.path / "trace" / "position.npy");
+  const std::size_t settled = 470;  // at 1.96 s
+  const Eigen::Matrix3Xd start = audit::points(position, 0), end = audit::points(position, settled);
+  Eigen::Index tip = 0;
+  for (Eigen::Index n = 0; n < start.cols(); ++n) {
+    if ((start.col(n) - Eigen::Vector3d(0.5, 1, 0)).norm() < 1e-9) tip = n;
+  }
+  ASSERT_NEAR(start(0, tip), 0.5, 1e-9);
+  // 4.8 mm is where ever finer meshes of CalculiX 2.20 lead.
+  EXPECT_NEAR((start(1, tip) - end(1, tip)) / 4.8e-3, 1, 0.05);
+  const std::vector<double> height = com_along(directory.path / "trace", Eigen::Vector3d::UnitY());
+  EXPECT_NEAR(height[480] - height[552], 0.5 * 9.81 * 0.3 * 0.3, 0.01);
+}
+
 TEST(Simulate, GivesTheSameBytesAgainAndReplacesWhatStoodThere) {
   const TemporaryDirectory directory;
   const std::string options = "--duration 0.5 --threads ";

@@ -133,6 +133,46 @@ TEST_F(SceneFiles, GiveRegionsTheirOwnMaterial) {
   EXPECT_GT(physics::centre_of_mass(half.scene.body, half.start.x).y(), 0.1);
 }
 
+TEST_F(SceneFiles, MakeBodiesOfEveryElementAndLaw) {
+  const std::string bar3 = "[body]\nshape = \"bar\"\nsize_m = [1.0, 0.2, 0.2]\ncell_size_m = 0.1\nelement = ";
+  const std::string bar2 = "dimension = 2\n[body]\nshape = \"bar\"\nsize_m = [1.0, 0.2]\ncell_size_m = 0.1\nelement = ";
+  const std::string heavy = "[[region]]\nnormal = [1, 0, 0]\ndensity_kg_m3 = 3000\n", heavy2 = "[[region]]\nnormal = [1, 0]\ndensity_kg_m3 = 3000\n";
+  for (const std::string law : {"stable_neo_hookean", "corotated_linear"}) {
+    SCOPED_TRACE(law);
+    const std::string material = "[material]\npoissons_ratio = 0.1\nlaw = \"" + law + "\"\n";
+    for (const std::string element : {"\"tet\"\n", "\"hex\"\n"}) {
+      const physics::Body body = scenario<3>(bar3 + element + material + heavy).scene.body;
+      ASSERT_EQ(body.elements.size(), 1U);
+      EXPECT_EQ(body.elements[0].block.element_count(), element == "\"hex\"\n" ? 40 : 200);
+      EXPECT_NEAR(body.mass.sum(), 80, 1e-9);
+    }
+    for (const std::string element : {"\"triangle\"\n", "\"quad\"\n"}) {
+      const physics::BodyOf<2> body = scenario<2>(bar2 + element + material + heavy2).scene.body;
+      ASSERT_EQ(body.elements.size(), 1U);
+      EXPECT_EQ(body.elements[0].block.element_count(), element == "\"quad\"\n" ? 20 : 40);
+      EXPECT_NEAR(body.mass.sum(), 400, 1e-9);
+    }
+  }
+  const std::string springs = "\"tet\"\n[material]\nlaw = \"springs\"\n";
+  EXPECT_TRUE(scenario<3>(bar3 + springs).scene.body.elements.empty());
+}
+
+TEST_F(SceneFiles, ClampWhatLiesWithin) {
+  const auto bar = scenario<3>(
+      "[body]\nshape = \"bar\"\nsize_m = [1.0, 0.2, 0.2]\ncell_size_m = 0.1\nrotation_deg = [0, 0, 90]\nvelocity_m_s = [1, 0, 0]\n"
+      "[[clamp]]\nnormal = [1, 0, 0]\noffset_m = 0.49\n[[clamp]]\nbox_m = [[-1, -1, -1], [-0.49, 1, 1]]\nuntil_s = 1.5\n");
+  ASSERT_EQ(bar.clamps.size(), 2U);
+  EXPECT_EQ(bar.clamps[1].until_s, 1.5);
+  EXPECT_EQ(bar.scene.body.held.size(), 18U);
+  for (const int node : bar.scene.body.held) {
+    EXPECT_NEAR(std::abs(bar.start.x(1, node)), 0.5, 1e-12);
+    EXPECT_EQ(bar.start.v.col(node).norm(), 0);
+  }
+  std::vector<int> held;
+  retarget::hold_at(bar.clamps, 1.5, held);
+  EXPECT_EQ(held, bar.clamps[0].nodes);
+}
+
 TEST_F(SceneFiles, LetWavesRunAlongTheirDirection) {
   const auto bar = scenario<2>(
       "dimension = 2\n[body]\nshape = \"bar\"\nsize_m = [1.0, 0.1]\ncell_size_m = 0.1\n"
@@ -225,7 +265,7 @@ TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {
             "line 3", "% of the volume", "cell_size_m"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\ndensity_kg_m3 = -5\n", "line 5", "'density_kg_m3' of [material] is -5", "above 0"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\npoissons_ratio = 0.5\n", "line 5", "is 0.5", "below 0.5"},
-           {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\npoissons_ratio = 0.1\n", "line 5", "Poisson's ratio of 0.25", "0.25 or more"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nlaw = \"springs\"\npoissons_ratio = 0.1\n", "line 6", "Poisson's ratio of 0.25", "0.25 or more"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nyoungs_modulus = 1e5\n", "line 5", "not known here", "Did you mean 'youngs_modulus_pa'?"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nyoungs_modulus_pa = \"soft\"\n", "line 5", "a text where a number belongs", ""},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[[region]]\nbox_m = [[5, 5, 5], [6, 6, 6]]\n", "line 5", "nothing of the body lies there", "own frame"},
@@ -238,6 +278,10 @@ TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[[activation]]\namplitude = 0.9\noffset = 0.2\n", "", "add up to 1.1", "below 0.95"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[[activation]]\namplitude = 0.1\nwavelength_m = 1\n", "line 4", "'wave_direction' of [[activation]] is missing", ""},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[[push]]\ntime_s = 1\n", "line 4", "'delta_v_m_s' of [[push]] is missing", ""},
+           {"[body]\nshape = \"sphere\"\nsize_m = 1\nelement = \"hex\"\n", "line 4", "only boxes", "Leave 'element' out"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\nelement = \"hex\"\n[material]\nlaw = \"springs\"\n", "line 5", "springs need tets", "another law"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nlaw = \"neo_hookean\"\n", "line 5", "none of ", "Did you mean 'stable_neo_hookean'?"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[clamp]]\nnormal = [0, 0, 0]\n", "line 5", "has no direction", ""},
            {"method = \"magic\"\n[body]\nshape = \"cube\"\nsize_m = 1\n", "line 1", "'method' is 'magic'", ""},
        }) {
     SCOPED_TRACE(bad.text);

@@ -15,6 +15,7 @@ TEST(NearestWord, IsTheOneWithTheFewestChanges) {
   EXPECT_EQ(nearest_word("size", known), "size_m");
   EXPECT_EQ(nearest_word("youngs_modulus", known), "youngs_modulus_pa");
   EXPECT_EQ(nearest_word("position_m_s", known), "position_m");
+  EXPECT_EQ(nearest_word("modulus_pa", known), "youngs_modulus_pa");
   EXPECT_EQ(nearest_word("colour", known), "");
   EXPECT_EQ(nearest_word("", known), "");
 }

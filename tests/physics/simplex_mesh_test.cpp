@@ -66,6 +66,24 @@ TYPED_TEST(SimplexMeshes, FillTheirShapesExactly) {
   }
 }
 
+TYPED_TEST(SimplexMeshes, OfBoxesHaveTheLatticesNodes) {
+  constexpr int Dim = TypeParam::kDim;
+  const VectorOf<Dim> size = vec<Dim>(0.3, 0.7, 1.1);
+  const Eigen::Matrix<int, Dim, 1> cells = Eigen::Vector3i(2, 3, 4).head<Dim>();
+  const BoxMeshOf<Dim> lattice = lattice_of_box<Dim>(size, cells);
+  const SimplexMeshOf<Dim> mesh = mesh_of_box<Dim>(size, cells);
+  ASSERT_EQ(lattice.nodes.cols(), mesh.nodes.cols());
+  for (Eigen::Index n = 0; n < mesh.nodes.cols(); ++n) {
+    EXPECT_LT((lattice.nodes.colwise() - mesh.nodes.col(n)).colwise().norm().minCoeff(), 1e-12);
+  }
+  for (Eigen::Index c = 0; c < lattice.boxes.cols(); ++c) {
+    for (int d = 0; d < Dim; ++d) {
+      const VectorOf<Dim> edge = lattice.nodes.col(lattice.boxes(1 << d, c)) - lattice.nodes.col(lattice.boxes(0, c));
+      EXPECT_LT((edge - size[d] / cells[d] * VectorOf<Dim>::Unit(d)).norm(), 1e-12);
+    }
+  }
+}
+
 TYPED_TEST(SimplexMeshes, OfBallsAreRound) {
   constexpr int Dim = TypeParam::kDim;
   for (const int cells : {8, 12}) {

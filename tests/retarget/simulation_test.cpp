@@ -11,14 +11,18 @@ namespace {
 
 using physics::VectorOf;
 
+template <int Dim>
+physics::ElementMesh<Dim> of_one_material(const physics::SimplexMeshOf<Dim>& mesh, const physics::ElementMaterial& material) {
+  return {mesh.nodes, mesh.simplices, {material}, Eigen::VectorXd::Ones(mesh.simplices.cols())};
+}
+
 /// A cube (square) of 0.2 m, its lowest point `height` [m] above the ground.
 template <int Dim>
 ScenarioOf<Dim> cube_at(double height) {
   ScenarioOf<Dim> scenario;
-  physics::SimplexMeshOf<Dim> mesh =
+  const physics::SimplexMeshOf<Dim> mesh =
       physics::mesh_of_box<Dim>(VectorOf<Dim>::Constant(0.2), Eigen::Matrix<int, Dim, 1>::Constant(2));
-  scenario.scene.body =
-      make_spring_body<Dim>(mesh, {physics::ElementMaterial{1000, 2e5, 0.4}}, Eigen::VectorXi::Zero(mesh.simplices.cols()), 0.01);
+  scenario.scene.body = make_spring_body<Dim>(of_one_material(mesh, {1000, 2e5, 0.4}), 0.01);
   scenario.scene.body.rest.row(1).array() += 0.1 + height;
   physics::touch_with_whole_surface(scenario.scene);
   scenario.start = {scenario.scene.body.rest, physics::PointsOf<Dim>::Zero(Dim, mesh.nodes.cols())};
@@ -166,6 +170,39 @@ TYPED_TEST(Simulations, MoveTheirObstaclesForAWhile) {
   expect_to_lie(run.course.contact_weights[72]);
 }
 
+TYPED_TEST(Simulations, HoldWhatIsClampedUntilItIsLetGo) {
+  constexpr int Dim = TypeParam::value;
+  for (const physics::Method method : {physics::Method::kExplicit, physics::Method::kEuler}) {
+    SCOPED_TRACE(physics::name_of(method));
+    ScenarioOf<Dim> scenario = cube_at<Dim>(1.0);
+    Clamp top, corner{{0}, 0.5};
+    for (int i = 0; i < scenario.scene.body.node_count(); ++i) {
+      if (scenario.scene.body.rest(1, i) > 1.199) top.nodes.push_back(i);
+    }
+    top.until_s = 0.5;
+    scenario.clamps = {top, corner};
+    hold_at(scenario.clamps, 0, scenario.scene.body.held);
+    EXPECT_EQ(scenario.scene.body.held.size(), top.nodes.size() + 1);
+    SimulationOptions options;
+    options.method = method;
+    options.duration_s = 0.7;
+    options.trace = true;
+    const Simulation run = simulate(scenario, options);
+    EXPECT_LT(run.report.momentum_residual_mg, 1e-6);
+    EXPECT_LT(run.report.energy_excess_mgl, 0.01);
+    const Eigen::Index release = 120;  // at 0.5 s
+    for (const int node : top.nodes) {
+      EXPECT_EQ(run.trace.position.col(release).segment(3 * node, 3), run.trace.position.col(0).segment(3 * node, 3));
+      EXPECT_EQ(run.trace.effect_force.col(release + 1).segment(3 * node, 3).norm(), 0);
+    }
+    // It hangs still by then, and what holds it bears its weight.
+    double held = 0;
+    for (Eigen::Index r = 1; r < run.trace.effect_force.rows(); r += 3) held += run.trace.effect_force(r, release);
+    EXPECT_NEAR(held / (9.81 * scenario.scene.body.mass.sum()), 1, 0.02);
+    EXPECT_NEAR(run.course.com(1, 30) - run.course.com.row(1).tail<1>()[0], 0.5 * 9.81 * 0.04, 0.01);
+  }
+}
+
 TYPED_TEST(Simulations, ThatDivergeSayWhenAndKeepWhatCameBefore) {
   constexpr int Dim = TypeParam::value;
   ScenarioOf<Dim> scenario = cube_at<Dim>(1.0);
@@ -221,7 +258,7 @@ TYPED_TEST(Simulations, SpringsHaveTheStiffnessOfTheirMaterial) {
   const physics::ElementMaterial material{1000, 3e5, 0.4};
   const physics::SimplexMeshOf<Dim> mesh =
       physics::mesh_of_ball<Dim>(1, 8);  // edges in many directions
-  const physics::BodyOf<Dim> body = make_spring_body<Dim>(mesh, {material}, Eigen::VectorXi::Zero(mesh.simplices.cols()), 0);
+  const physics::BodyOf<Dim> body = make_spring_body<Dim>(of_one_material(mesh, material), 0);
   const physics::Lame lame = physics::lame_of(material.youngs_modulus, material.poissons_ratio);
   const Eigen::VectorXd passive = Eigen::VectorXd::Ones(body.edge_count());
   constexpr double kStrain = 1e-5;

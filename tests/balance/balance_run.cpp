@@ -23,22 +23,21 @@ constexpr double kFirstShove = 0.1;     // [m/s] at most
 constexpr double kPushCycle = 2;        // in which the push comes; seconds where a clip is played once
 constexpr int kEighths = 8, kQuarters = 4;
 
-/// The correctors that are compared; "usual" is what convert uses.
-const std::map<std::string, retarget::CorrectorOptions>& variants() {
-  static const std::map<std::string, retarget::CorrectorOptions> table = [] {
-    std::map<std::string, retarget::CorrectorOptions> made;
-    const retarget::CorrectorOptions usual;
-    made["usual"] = usual;
-    made["effort_1"] = made["effort_10"] = made["settle_0.15"] = made["settle_0.6"] = made["nodes_0.4"] = made["root_12"] = usual;
-    made["effort_1"].effort = 1;
-    made["effort_10"].effort = 10;
-    made["settle_0.15"].settle_s = 0.15;
-    made["settle_0.6"].settle_s = 0.6;
-    made["nodes_0.4"].node_weight = 0.4;
-    made["root_12"].root_weight = 12;
-    return made;
-  }();
-  return table;
+/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15".
+void set_variant(const std::string& variant, retarget::CorrectorOptions& options) {
+  const std::map<std::string, double*> knobs{{"effort", &options.effort},       {"settle", &options.settle_s},
+                                             {"nodes", &options.node_weight},   {"root", &options.root_weight},
+                                             {"horizon", &options.horizon_s}};
+  std::istringstream parts(variant);
+  for (std::string part; std::getline(parts, part, ':');) {
+    if (part == "usual") continue;
+    const std::size_t equals = part.find('=');
+    const auto knob = knobs.find(part.substr(0, equals));
+    if (equals == std::string::npos || knob == knobs.end()) {
+      throw Error("balance_run", "VARIANT", "'" + part + "' changes nothing that is known", "Write it like effort=1:settle=0.15.");
+    }
+    *knob->second = std::stod(part.substr(equals + 1));
+  }
 }
 
 retarget::Push shove(double time_s, double angle, double speed) {
@@ -81,13 +80,11 @@ int run(int argc, char** argv) {
   }
   const std::string directory = argv[1], variant = argv[2], push = argv[4];
   const auto seed = static_cast<unsigned>(std::atoi(argv[3]));
-  const auto entry = variants().find(variant);
-  if (entry == variants().end()) throw Error("balance_run", "VARIANT", "there is no '" + variant + "'", "See variants() in its source.");
   const io::LoadedCreature creature = io::load_creature(directory);
   const retarget::Performer& performer = creature.target.performer;
   const retarget::Motion& target = performer.prepared.target;
   retarget::PerformOptions options;
-  options.replay.corrector = entry->second;
+  set_variant(variant, options.replay.corrector);
   options.replay.duration_s = target.loop ? std::atof(argv[5]) * target.duration_s() : retarget::usual_duration(target);
   options.baselines = false;
   options.threads = 1;

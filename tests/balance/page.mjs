@@ -55,7 +55,10 @@ const charts = clips.map((clip) => {
   const curves = [...grouped.values()].filter((group) => group.clip === clip && group.seeds.length > 0)
     .map((group) => `<path d="${curve(group.seeds)}" stroke="${kColours[variants.indexOf(group.variant) % kColours.length]}"/>`);
   const pictures = variants.filter((variant) => existsSync(join(directory, "frames", `${clip},${variant}.json`)))
-    .map((variant) => `<figure><canvas width="300" height="150" data-frames='${readFileSync(join(directory, "frames", `${clip},${variant}.json`), "utf8").trim()}'></canvas><figcaption>${variant}, seed 1</figcaption></figure>`);
+    .map((variant) => {
+      const frames = readFileSync(join(directory, "frames", `${clip},${variant}.json`), "utf8").trim();
+      return `<figure><canvas width="300" height="150" data-frames='${frames}'></canvas><figcaption>${variant}, seed 1</figcaption></figure>`;
+    });
   return `<section><h2>${clip}</h2><svg viewBox="-2 -4 104 108" preserveAspectRatio="none">${curves.join("")}</svg>${pictures.join("")}</section>`;
 });
 const columns = Object.keys(summary[0] ?? {});

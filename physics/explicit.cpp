@@ -61,7 +61,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
         forces_(scene.body),
         force_(Dim, scene.body.node_count()),
         inverse_mass_(scene.body.mass.cwiseInverse()),
-        contact_(scene) {
+        contact_(scene),
+        is_between_(!scene.body.elements.empty()) {
     mode_at_rest_ = stiffest_mode_at_rest(scene.body, forces_);
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
@@ -81,6 +82,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
     const double h = dt / substeps;
     clear(impulses);
     contact_.forget_reach();
+    begin_between(h, state, impulses);
     for (int s = 0; s < substeps; ++s) {
       force_.setZero();
       forces_.add_forces(state, force_);
@@ -107,6 +109,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
       if (contact_.is_needed()) contact_.push_apart(h, std::sqrt(fastest), state, impulses);
       state.x += h * state.v;
     }
+    if (is_between_) state.x -= (0.5 * h) * state.v;
     for (std::size_t n = 0; n < scene_.body.held.size(); ++n) {
       impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.contact_nodes.col(scene_.body.held[n]);
     }
@@ -114,6 +117,18 @@ class ExplicitStepper final : public StepperOf<Dim> {
   }
 
  private:
+  /// Takes the places half a substep on, where the velocities that come in and go out are those of the whole step: an error of
+  /// second order instead of first, at no cost. Bodies of springs and volumes alone keep the motion that they always had.
+  void begin_between(double h, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
+    if (!is_between_) return;
+    for (std::size_t n = 0; n < scene_.body.held.size(); ++n) {
+      const int node = scene_.body.held[n];
+      impulses.hold.col(static_cast<Eigen::Index>(n)) -= scene_.body.mass[node] * state.v.col(node);
+      state.v.col(node).setZero();
+    }
+    state.x += (0.5 * h) * state.v;
+  }
+
   /// Turns the force on held nodes into the one that stops them, and books what that takes.
   void hold(double h, const StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
     for (std::size_t n = 0; n < scene_.body.held.size(); ++n) {
@@ -129,6 +144,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
   PointsOf<Dim> force_;  // [N]
   Eigen::VectorXd inverse_mass_;
   ImpulseContact<Dim> contact_;
+  bool is_between_;  // substeps take their forces between the places that the steps tell
   StateOf<Dim> start_;
   StiffestMode mode_at_rest_{};  // of the body at rest
   double shortest_edge_ = 0;     // [m]

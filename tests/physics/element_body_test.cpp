@@ -66,7 +66,7 @@ TYPED_TEST(ElementSteppers, KeepMomentumInFreeFlightWhateverTheActivation) {
 
 TYPED_TEST(ElementSteppers, HoldACantileverAndBookWhatThatTakes) {
   constexpr int Dim = TypeParam::kDim;
-  SceneOf<Dim> scene = cantilever<Dim>(2, Cut::kBoxes, {1000, 5e5, 0.4});
+  SceneOf<Dim> scene = cantilever<Dim>(8, 2, Cut::kBoxes, {1000, 5e5, 0.4});
   BodyOf<Dim>& body = scene.body;
   body.edge_damping.setConstant(20);
   const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
@@ -101,7 +101,7 @@ TYPED_TEST(ElementSteppers, ContractAsTheyAreAskedTo) {
 
 // CalculiX 2.20 (C3D4) on this mesh with E 5e7, nu 0.4 sags by 2.1133 mm at the end of the axis.
 TEST(ElementStatics, SettledTetsSagAsCalculixSays) {
-  const SceneOf<3> scene = cantilever<3>(2, Cut::kSixTets, {1000, 5e7, 0.4});
+  const SceneOf<3> scene = cantilever<3>(8, 2, Cut::kSixTets, {1000, 5e7, 0.4});
   const std::unique_ptr<Stepper> stepper = make_euler_stepper(scene);
   Impulses impulses = make_impulses(scene);
   State state{scene.body.rest, Eigen::Matrix3Xd::Zero(3, scene.body.node_count())};

@@ -31,10 +31,10 @@ void for_random_element_bodies(unsigned seeds, const Look& look) {
 
 /// The cantilever of the peer benchmark: 1 m long, a quarter high and wide, held where x = 0.
 template <int Dim>
-SceneOf<Dim> cantilever(int cells_across, Cut cut, const ElementMaterial& material) {
+SceneOf<Dim> cantilever(int cells_along, int cells_across, Cut cut, const ElementMaterial& material) {
   Eigen::Matrix<int, Dim, 1> cells = Eigen::Matrix<int, Dim, 1>::Constant(cells_across);
   Eigen::Matrix<double, Dim, 1> size = Eigen::Matrix<double, Dim, 1>::Constant(0.25);
-  cells[0] = 4 * cells_across;
+  cells[0] = cells_along;
   size[0] = 1;
   BodyOf<Dim> body = make_body(element_bar<Dim>(cells, size, cut, material), ElementBodyOptions{});
   for (int i = 0; i < body.node_count(); ++i) {

@@ -214,7 +214,6 @@ class SceneReader {
     }
     start.x = scene.body.rest;
     const std::string shape = body.choice_or_first("start", {"rest", "random", "collapsed", "flattened"});
-    is_distorted_ = shape != "rest";
     retarget::distort<Dim>(shape == "random"      ? StartShape::kRandom
                            : shape == "collapsed" ? StartShape::kCollapsed
                            : shape == "flattened" ? StartShape::kFlattened
@@ -245,16 +244,12 @@ class SceneReader {
     scenario_.pushes.push_back(push);
   }
 
- public:
-  bool is_distorted() const { return is_distorted_; }
 
- private:
   const TomlReader& root_;
   SceneFile& scene_;
   physics::ElementMesh<Dim> mesh_;  // the rest shape in its own frame
   ScenarioOf<Dim> scenario_;
   Eigen::VectorXd most_activation_;  // E
-  bool is_distorted_ = false;
 };
 
 template <int Dim>
@@ -262,7 +257,7 @@ void read_in_dimension(const TomlReader& root, SceneFile& scene) {
   SceneReader<Dim> reader(root, scene);
   scene.scenario = reader.read();
   const std::optional<physics::Method> method = method_named(root.choice_or_first("method", method_names()));
-  scene.method = method ? *method : reader.is_distorted() ? physics::Method::kEuler : physics::Method::kExplicit;
+  scene.method = method.value_or(physics::Method::kExplicit);
 }
 
 }  // namespace

@@ -223,13 +223,12 @@ TEST_F(SceneFiles, DistortTheStartBySeed) {
   const auto flat = scenario<3>(head + "\"flattened\"\n"), point = scenario<3>(head + "\"collapsed\"\n");
   EXPECT_NEAR(flat.start.x.row(1).minCoeff(), 1, 1e-12);
   EXPECT_NEAR(flat.start.x.row(1).maxCoeff(), 1, 1e-12);
-  EXPECT_LT((point.start.x.colwise() - Eigen::Vector3d(0, 1, 0)).norm(), 1e-12);
+  EXPECT_LE((point.start.x.colwise() - Eigen::Vector3d(0, 1, 0)).cwiseAbs().maxCoeff(), 1e-4 + 1e-12);
   write_file(file, head + "\"random\"\n");
   const auto with_seed = [&](unsigned seed) { return std::get<ScenarioOf<3>>(read_scene_file(file, seed).scenario).start.x; };
   EXPECT_EQ(with_seed(1), with_seed(1));
   EXPECT_GT((with_seed(1) - with_seed(2)).norm(), 0.1);
   EXPECT_LE((with_seed(3).colwise() - Eigen::Vector3d(0, 1, 0)).cwiseAbs().maxCoeff(), 0.1 + 1e-12);
-  EXPECT_EQ(read_scene_file(file).method, physics::Method::kEuler);
 }
 
 TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {

@@ -47,15 +47,13 @@ class SceneReader {
   }
 
  private:
-  static VectorOf<Dim> vector_or_zero(const TomlReader& table, const std::string& key) {
-    return table.numbers_or(key, VectorOf<Dim>::Zero());
-  }
+  static VectorOf<Dim> place_of(const TomlReader& table) { return table.numbers_or("position_m", VectorOf<Dim>::Zero(), kPlace); }
 
   physics::ElementMaterial material_of(const TomlReader& table, const physics::ElementMaterial& otherwise) const {
     physics::ElementMaterial material;
-    material.density = table.number_or("density_kg_m3", otherwise.density, kAboveZero);
-    material.youngs_modulus = table.number_or("youngs_modulus_pa", otherwise.youngs_modulus, kAboveZero);
-    constexpr Within kRange{.least = 0, .most = 0.5, .without_most = true};
+    material.density = table.number_or("density_kg_m3", otherwise.density, {.least = 0, .most = 1e9, .without_least = true});
+    material.youngs_modulus = table.number_or("youngs_modulus_pa", otherwise.youngs_modulus, {.least = 0, .most = 1e15, .without_least = true});
+    constexpr Within kRange{.least = 0, .most = 0.4999};
     material.poissons_ratio = table.number_or("poissons_ratio", otherwise.poissons_ratio, kRange);
     if (scene_.law == kSprings && material.poissons_ratio < kLeastPoissonsRatio) {
       throw table.refusal("poissons_ratio", "springs alone have a Poisson's ratio of 0.25", "Give 0.25 or more, or another law.");
@@ -70,7 +68,7 @@ class SceneReader {
     if (const std::optional<TomlReader> table = root_.table("material")) {
       scene_.law = table->choice_or_first("law", kLaws);
       most = material_of(*table, most);
-      damping_time = table->number_or("damping_time_s", damping_time, kNotNegative);
+      damping_time = table->number_or("damping_time_s", damping_time, {.least = 0, .most = 1000});
       table->refuse_others();
     }
     const bool of_boxes = mesh_.nodes.rows() != Dim + 1;
@@ -170,7 +168,7 @@ class SceneReader {
       scene.ground.normal = VectorOf<Dim>::Zero();
       scene.ground.normal[0] = -std::sin(slope);
       scene.ground.normal[1] = std::cos(slope);
-      scene.ground.offset = ground->number_or("height_m", 0) * scene.ground.normal[1];
+      scene.ground.offset = ground->number_or("height_m", 0, kPlace) * scene.ground.normal[1];
       scene.ground.friction = ground->number_or("friction", kFriction, kFrictionRange);
       ground->refuse_others();
     }
@@ -182,13 +180,13 @@ class SceneReader {
     const std::string mesh = Dim == 3 ? "mesh" : "outline";
     const std::string shape = table.choice("shape", {"box", "ball", "half_space", mesh});
     if (shape == "box") {
-      obstacle.shape = physics::BoxOf<Dim>{table.number_or_numbers("size_m", Dim, kAboveZero) / 2};
+      obstacle.shape = physics::BoxOf<Dim>{table.number_or_numbers("size_m", Dim, kLength) / 2};
     } else if (shape == "ball") {
-      obstacle.shape = physics::Ball{table.number("size_m", kAboveZero) / 2};
+      obstacle.shape = physics::Ball{table.number("size_m", kLength) / 2};
     } else if (shape == mesh) {
       obstacle.shape = surface_of<Dim>(table);
     }
-    obstacle.place = vector_or_zero(table, "position_m");
+    obstacle.place = place_of(table);
     obstacle.turn = rotation_of<Dim>(table);
     obstacle.friction = table.number_or("friction", kFriction, kFrictionRange);
     for (const TomlReader& move : table.tables("move")) {
@@ -208,21 +206,20 @@ class SceneReader {
     physics::SceneOf<Dim>& scene = scenario_.scene;
     physics::StateOf<Dim>& start = scenario_.start;
     const physics::BlockOf<Dim> turn = rotation_of<Dim>(body);
-    scene.body.rest = (turn * mesh_.rest).colwise() + vector_or_zero(body, "position_m");
+    scene.body.rest = (turn * mesh_.rest).colwise() + place_of(body);
     if (body.has("gap_m")) {
       if (!scene.has_ground) throw body.refusal("gap_m", "there is no ground to keep a gap from", "Add [ground], or leave 'gap_m' out.");
       const double lowest = (scene.ground.normal.transpose() * scene.body.rest).minCoeff();
-      scene.body.rest.colwise() += (scene.ground.offset + body.number("gap_m") - lowest) * scene.ground.normal;
+      scene.body.rest.colwise() += (scene.ground.offset + body.number("gap_m", kPlace) - lowest) * scene.ground.normal;
     }
     start.x = scene.body.rest;
     const std::string shape = body.choice_or_first("start", {"rest", "random", "collapsed", "flattened"});
-    is_distorted_ = shape != "rest";
     retarget::distort<Dim>(shape == "random"      ? StartShape::kRandom
                            : shape == "collapsed" ? StartShape::kCollapsed
                            : shape == "flattened" ? StartShape::kFlattened
                                                   : StartShape::kRest,
                            scene_.seed, start.x);
-    const VectorOf<Dim> velocity = vector_or_zero(body, "velocity_m_s"), centre = physics::centre_of_mass(scene.body, start.x);
+    const VectorOf<Dim> velocity = body.numbers_or("velocity_m_s", VectorOf<Dim>::Zero()), centre = physics::centre_of_mass(scene.body, start.x);
     start.v = velocity.replicate(1, start.x.cols());
     for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += spin_velocity(body, start.x.col(i) - centre);
     retarget::hold_at(scenario_.clamps, 0, scene.body.held);
@@ -247,16 +244,12 @@ class SceneReader {
     scenario_.pushes.push_back(push);
   }
 
- public:
-  bool is_distorted() const { return is_distorted_; }
 
- private:
   const TomlReader& root_;
   SceneFile& scene_;
   physics::ElementMesh<Dim> mesh_;  // the rest shape in its own frame
   ScenarioOf<Dim> scenario_;
   Eigen::VectorXd most_activation_;  // E
-  bool is_distorted_ = false;
 };
 
 template <int Dim>
@@ -264,7 +257,7 @@ void read_in_dimension(const TomlReader& root, SceneFile& scene) {
   SceneReader<Dim> reader(root, scene);
   scene.scenario = reader.read();
   const std::optional<physics::Method> method = method_named(root.choice_or_first("method", method_names()));
-  scene.method = method ? *method : reader.is_distorted() ? physics::Method::kEuler : physics::Method::kExplicit;
+  scene.method = method.value_or(physics::Method::kExplicit);
 }
 
 }  // namespace

@@ -46,14 +46,14 @@ Fineness fineness_of(const TomlReader& body) {
   if (body.has("cell_size_m") && body.has("nodes")) {
     throw body.refusal("nodes", "'cell_size_m' and 'nodes' both say how fine the mesh is", "Leave one of them out.");
   }
-  fineness.cell = body.number_or("cell_size_m", 0, kAboveZero);
+  fineness.cell = body.number_or("cell_size_m", 0, kLength);
   fineness.nodes = body.whole_or("nodes", kUsualNodes<Dim>, kFewestNodes, kMostNodes);
   return fineness;
 }
 
 void refuse_too_many(const TomlReader& body, double nodes) {
   if (nodes <= static_cast<double>(kMostNodes)) return;
-  throw body.refusal("cell_size_m", "so small cells make more than " + std::to_string(kMostNodes) + " nodes", "Give a larger 'cell_size_m'.");
+  throw body.refusal(body.has("cell_size_m") ? "cell_size_m" : "shape", "so small cells make more than " + std::to_string(kMostNodes) + " nodes", "Give a larger 'cell_size_m'.");
 }
 
 /// How many cells a box has along each axis.
@@ -75,7 +75,7 @@ Eigen::Matrix<int, Dim, 1> cells_of_box(const TomlReader& body, const VectorOf<D
 
 template <int Dim>
 SimplexMeshOf<Dim> ball(const TomlReader& body) {
-  const double diameter = body.number("size_m", kAboveZero);
+  const double diameter = body.number("size_m", kLength);
   const auto nodes_of = [](int n) { return std::pow(n + 1, Dim); };
   const int cells = std::max(2, fineness_of<Dim>(body).parts(diameter, nodes_of));
   refuse_too_many(body, nodes_of(cells));
@@ -84,7 +84,7 @@ SimplexMeshOf<Dim> ball(const TomlReader& body) {
 
 template <int Dim>
 SimplexMeshOf<Dim> regular_simplex(const TomlReader& body) {
-  const double size = body.number("size_m", kAboveZero);
+  const double size = body.number("size_m", kLength);
   const auto nodes_of = [](double n) { return Dim == 3 ? (n + 1) * (n + 2) * (n + 3) / 6 : (n + 1) * (n + 2) / 2; };
   const int parts = fineness_of<Dim>(body).parts(size, nodes_of);
   refuse_too_many(body, nodes_of(parts));
@@ -118,7 +118,7 @@ SimplexMeshOf<Dim> inside(const TomlReader& body, std::vector<std::string>& warn
   const Fineness fineness = fineness_of<Dim>(body);
   const double whole = enclosed_volume(surface);
   const double cell = fineness.cell > 0 ? fineness.cell : std::pow(whole / static_cast<double>(fineness.nodes), 1.0 / Dim);
-  refuse_too_many(body, ((surface.high() - surface.low()) / cell).prod());
+  refuse_too_many(body, (((surface.high() - surface.low()) / cell).array() + 3).prod());
   SimplexMeshOf<Dim> mesh = physics::mesh_inside<Dim>(surface, cell);
   const double loss = mesh.simplices.cols() > 0 ? 1 - physics::volume(mesh) / whole : 1;
   if (std::abs(loss) > kLargestLoss) {
@@ -191,7 +191,7 @@ template <int Dim>
 ClosedMeshOf<Dim> surface_of(const TomlReader& table) {
   if constexpr (Dim == 3) {
     const std::filesystem::path file = std::filesystem::absolute(table.file()).parent_path() / table.text("file");
-    const double scale = table.number_or("scale", 1, kAboveZero);
+    const double scale = table.number_or("scale", 1, kLength);
     try {
       const ClosedMeshOf<3> surface = read_closed_mesh(file);
       return {scale * surface.vertices(), surface.faces()};
@@ -199,7 +199,7 @@ ClosedMeshOf<Dim> surface_of(const TomlReader& table) {
       throw table.refusal("file", file.string() + ": " + error.what(), error.mend);
     }
   } else {
-    Eigen::Matrix2Xd corners = table.lists("outline_m", 2);
+    Eigen::Matrix2Xd corners = table.lists("outline_m", 2, kPlace);
     if (corners.cols() < 3) throw table.refusal("outline_m", "the outline has fewer than three corners", "Give three or more.");
     if (cuts_itself(corners)) throw table.refusal("outline_m", "the outline cuts itself", "Give the corners in their order around.");
     Eigen::Matrix2Xi sides(2, corners.cols());
@@ -222,7 +222,7 @@ physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, 
                    : body.choice("shape", {"square", "bar", "circle", "triangle", "pyramid", "outline"});
   element = body.choice_or_first("element", Dim == 3 ? std::vector<std::string>{"tet", "hex"} : std::vector<std::string>{"triangle", "quad"});
   const bool of_boxes = element == "hex" || element == "quad";
-  const auto size = [&]() -> VectorOf<Dim> { return body.number_or_numbers("size_m", Dim, kAboveZero); };
+  const auto size = [&]() -> VectorOf<Dim> { return body.number_or_numbers("size_m", Dim, kLength); };
   SimplexMeshOf<Dim> mesh;
   if (shape == "sphere" || shape == "circle") {
     mesh = ball<Dim>(body);
@@ -233,7 +233,7 @@ physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, 
   } else if (shape == "mesh" || shape == "outline") {
     mesh = inside<Dim>(body, warnings);
   } else {
-    const VectorOf<Dim> extents = shape == "bar" ? VectorOf<Dim>(body.numbers("size_m", Dim, kAboveZero)) : size();
+    const VectorOf<Dim> extents = shape == "bar" ? VectorOf<Dim>(body.numbers("size_m", Dim, kLength)) : size();
     const Eigen::Matrix<int, Dim, 1> cells = cells_of_box<Dim>(body, extents);
     if (of_boxes) {
       const physics::BoxMeshOf<Dim> lattice = physics::lattice_of_box<Dim>(extents, cells);

@@ -14,6 +14,7 @@ using retarget::SimulationCourse;
 constexpr double kSpread = 3;      // of a half space, per L
 constexpr double kDepth = 4;       // of 2D obstacles over the body's thickness
 constexpr int kRoundCells = 16;    // across a ball
+constexpr double kRounding = 1e-9;  // of a depth, per D: less is drawn as none
 constexpr int kOutlineCells = 24;  // along an outline
 
 template <int Dim>
@@ -96,7 +97,7 @@ std::vector<PageChart> charts_of(const ScenarioOf<Dim>& scenario, const Simulati
       chart("Change of the whole body's volume", "change [%]", course, {{"volume", 100 * (course.volume_ratio.array() - 1)}})};
   if (scenario.scene.has_ground || !scenario.scene.obstacles.empty()) {
     charts.push_back(chart("Forces of contact, added up", "force over weight [-]", course, {{"contact", course.contact_weights}}));
-    charts.push_back(chart("Deepest penetration", "depth [% D]", course, {{"penetration", 100 / scenario.size * course.penetration_m}}));
+    charts.push_back(chart("Deepest penetration", "depth [% D]", course, {{"penetration", 100 / scenario.size * (course.penetration_m.array() > kRounding * scenario.size).select(course.penetration_m, 0)}}));
   }
   if (!scenario.waves.empty()) charts.push_back(chart("Mean activation", "activation [-]", course, {{"mean", course.mean_activation}}));
   return charts;

@@ -194,7 +194,7 @@ Eigen::VectorXd TomlReader::number_or_numbers(const std::string& key, Eigen::Ind
   return Eigen::VectorXd::Constant(count, number_in(key, node, within));
 }
 
-Eigen::MatrixXd TomlReader::lists(const std::string& key, Eigen::Index rows) const {
+Eigen::MatrixXd TomlReader::lists(const std::string& key, Eigen::Index rows, const Within& within) const {
   const toml::array* list = need(key).as_array();
   const std::string form = "Write it like " + key + " = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].";
   if (list == nullptr) throw refusal(key, named(key) + " is not a list", form);
@@ -205,7 +205,7 @@ Eigen::MatrixXd TomlReader::lists(const std::string& key, Eigen::Index rows) con
     if (column == nullptr || static_cast<Eigen::Index>(column->size()) != rows) {
       throw Error(file_->string(), at_line(node), named(key) + " holds something that is no list of " + std::to_string(rows) + " numbers", form);
     }
-    for (Eigen::Index r = 0; r < rows; ++r) values(r, c) = number_in(key, *column->get(static_cast<std::size_t>(r)), kAny);
+    for (Eigen::Index r = 0; r < rows; ++r) values(r, c) = number_in(key, *column->get(static_cast<std::size_t>(r)), within);
   }
   return values;
 }

@@ -25,6 +25,8 @@ struct Within {
 constexpr Within kAny{};
 constexpr Within kAboveZero{.least = 0, .without_least = true};
 constexpr Within kNotNegative{.least = 0};
+constexpr Within kLength{.least = 1e-6, .most = 1e6};   // [m]
+constexpr Within kPlace{.least = -1e7, .most = 1e7};    // [m], a coordinate
 
 /// One table of a TOML file, read strictly: every value has its type and range, and no key is left over. All refusals are
 /// Errors that name file and line.
@@ -47,7 +49,7 @@ class TomlReader {
   /// The same, or one number for all of them.
   Eigen::VectorXd number_or_numbers(const std::string& key, Eigen::Index count, const Within& within = kAny) const;
   /// Lists of `rows` numbers each, as columns.
-  Eigen::MatrixXd lists(const std::string& key, Eigen::Index rows) const;
+  Eigen::MatrixXd lists(const std::string& key, Eigen::Index rows, const Within& within = kAny) const;
   /// A table below this one; nothing where it is missing.
   std::optional<TomlReader> table(const std::string& key) const;
   /// An array of tables ([[obstacle]]); empty where it is missing.

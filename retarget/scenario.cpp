@@ -6,6 +6,8 @@
 
 namespace hydrostat::retarget {
 
+constexpr double kCollapse = 1e-3;
+
 template <int Dim>
 physics::Material spring_material(const physics::ElementMaterial& material, double damping_time) {
   const physics::Lame lame = physics::lame_of(material.youngs_modulus, material.poissons_ratio);
@@ -78,16 +80,21 @@ template <int Dim>
 void distort(StartShape shape, unsigned seed, physics::PointsOf<Dim>& x) {
   const physics::VectorOf<Dim> low = x.rowwise().minCoeff(), high = x.rowwise().maxCoeff(), middle = (low + high) / 2;
   std::mt19937 random(seed);
+  // Not a distribution of the library's, whose numbers are its own affair.
+  const auto within_box = [&]() -> physics::VectorOf<Dim> {
+    physics::VectorOf<Dim> place;
+    for (int d = 0; d < Dim; ++d) place[d] = low[d] + (high[d] - low[d]) * (static_cast<double>(random()) / 4294967296.0);
+    return place;
+  };
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     switch (shape) {
       case StartShape::kRest:
         break;
       case StartShape::kRandom:
-        // Not a distribution of the library's, whose numbers are its own affair.
-        for (int d = 0; d < Dim; ++d) x(d, i) = low[d] + (high[d] - low[d]) * (static_cast<double>(random()) / 4294967296.0);
+        x.col(i) = within_box();
         break;
       case StartShape::kCollapsed:
-        x.col(i) = middle;
+        x.col(i) = middle + kCollapse * (within_box() - middle);
         break;
       case StartShape::kFlattened:
         x(1, i) = middle.y();

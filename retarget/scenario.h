@@ -71,7 +71,7 @@ void activations_at(const std::vector<Wave>& waves, double time_s, Eigen::Vector
 enum class StartShape {
   kRest,
   kRandom,     // every node anywhere in the box of the rest shape
-  kCollapsed,  // all nodes in its middle
+  kCollapsed,  // the same in a box a thousandth as large about its middle: in one point no force would have a direction
   kFlattened,  // all nodes on the plane through its middle that is level
 };
 /// Moves the nodes of `x`, the placed rest shape; random ones by `seed`.

@@ -154,7 +154,7 @@ TEST(Simulate, RefusesOnOneLineAndLeavesNothing) {
   io::write_file(directory.path / "bad.toml", "[body]\nshape = \"cube\"\nsize_m = -1\n");
   const Outcome outcome = simulate(directory.path, "bad.toml");
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_EQ(outcome.err, "bad.toml: line 3: 'size_m' of [body] is -1. Give a number that is above 0.\n");
+  EXPECT_EQ(outcome.err, "bad.toml: line 3: 'size_m' of [body] is -1. Give a number that is at least 1e-06 and at most 1e+06.\n");
   EXPECT_EQ(outcome.out, "");
   EXPECT_EQ(names_in(directory.path), std::set<std::string>{"bad.toml"});
 

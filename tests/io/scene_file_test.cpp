@@ -223,13 +223,12 @@ TEST_F(SceneFiles, DistortTheStartBySeed) {
   const auto flat = scenario<3>(head + "\"flattened\"\n"), point = scenario<3>(head + "\"collapsed\"\n");
   EXPECT_NEAR(flat.start.x.row(1).minCoeff(), 1, 1e-12);
   EXPECT_NEAR(flat.start.x.row(1).maxCoeff(), 1, 1e-12);
-  EXPECT_LT((point.start.x.colwise() - Eigen::Vector3d(0, 1, 0)).norm(), 1e-12);
+  EXPECT_LE((point.start.x.colwise() - Eigen::Vector3d(0, 1, 0)).cwiseAbs().maxCoeff(), 1e-4 + 1e-12);
   write_file(file, head + "\"random\"\n");
   const auto with_seed = [&](unsigned seed) { return std::get<ScenarioOf<3>>(read_scene_file(file, seed).scenario).start.x; };
   EXPECT_EQ(with_seed(1), with_seed(1));
   EXPECT_GT((with_seed(1) - with_seed(2)).norm(), 0.1);
   EXPECT_LE((with_seed(3).colwise() - Eigen::Vector3d(0, 1, 0)).cwiseAbs().maxCoeff(), 0.1 + 1e-12);
-  EXPECT_EQ(read_scene_file(file).method, physics::Method::kEuler);
 }
 
 TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {
@@ -248,7 +247,10 @@ TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {
            {"[body]\nshape = 3\n", "line 2", "is a number where a text belongs", "quotes"},
            {"[body]\nshape = \"circle\"\n", "line 2", "none of cube", ""},
            {"[body]\nshape = \"cube\"\n", "line 1", "'size_m' of [body] is missing", "Add size_m"},
-           {"[body]\nshape = \"cube\"\nsize_m = -1\n", "line 3", "'size_m' of [body] is -1", "above 0"},
+           {"[body]\nshape = \"cube\"\nsize_m = -1\n", "line 3", "'size_m' of [body] is -1", "at least 1e-06"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1e300\n", "line 3", "is 1e+300", "at most 1e+06"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\nposition_m = [0, 1e30, 0]\n", "line 4", "is 1e+30", "at most 1e+07"},
+           {"dimension = 2\n[body]\nshape = \"outline\"\noutline_m = [[0, 0], [1, 0], [1, 1e-12], [0, 1e-12]]\n", "line 3", "more than 50000 nodes", ""},
            {"[body]\nshape = \"cube\"\nsize_m = [1, 2]\n", "line 3", "not a list of 3 numbers", ""},
            {"[body]\nshape = \"cube\"\nsize = 1\nsize_m = 1\n", "line 3", "'size' of [body] is not known here", "Did you mean 'size_m'?"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\nfile = \"x\"\n", "line 4", "'file' of [body] is not known here", ""},
@@ -264,7 +266,7 @@ TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {
            {"dimension = 2\n[body]\nshape = \"outline\"\noutline_m = [[0, 0], [1, 0], [1, 0.01], [0.55, 0.01], [0.5, 0.3], [0.45, 0.01], [0, 0.01]]\ncell_size_m = 0.3\n",
             "line 3", "% of the volume", "cell_size_m"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\ndensity_kg_m3 = -5\n", "line 5", "'density_kg_m3' of [material] is -5", "above 0"},
-           {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\npoissons_ratio = 0.5\n", "line 5", "is 0.5", "below 0.5"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\npoissons_ratio = 0.5\n", "line 5", "is 0.5", "at most 0.4999"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nlaw = \"springs\"\npoissons_ratio = 0.1\n", "line 6", "Poisson's ratio of 0.25", "0.25 or more"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nyoungs_modulus = 1e5\n", "line 5", "not known here", "Did you mean 'youngs_modulus_pa'?"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nyoungs_modulus_pa = \"soft\"\n", "line 5", "a text where a number belongs", ""},

@@ -44,7 +44,8 @@ TYPED_TEST(Guard, LeavesSoundStepsAsTheyAreToTheBit) {
 
 TYPED_TEST(Guard, FindsBackFromRandomCollapsedAndFlattenedStarts) {
   constexpr int Dim = TypeParam::kDim;
-  SceneOf<Dim> scene = cantilever<Dim>(Dim == 2 ? 8 : 4, Dim == 2 ? 2 : 1, Dim == 2 ? Cut::kTwoTriangles : Cut::kSixTets, {1000, 5e5, 0.4});
+  const Cut cut = Dim == 2 ? Cut::kTwoTriangles : Cut::kSixTets;
+  SceneOf<Dim> scene = cantilever<Dim>(Dim == 2 ? 8 : 4, Dim == 2 ? 2 : 1, cut, {1000, 5e5, 0.4});
   scene.body.held.clear();
   scene.gravity.setZero();
   const int nodes = scene.body.node_count();

@@ -1,5 +1,3 @@
-#include "physics/euler.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -21,7 +19,6 @@ constexpr double kShorterUpdate = 0.7;
 constexpr double kResidual = 1e-4;      // small enough
 constexpr double kInnerDecrease = 0.3;  // of the residual [-] between two updates of the friction limits
 constexpr double kGivenUp = 1e-2;       // after the last iterate: no solution was found
-constexpr double kRunaway = 100;        // of the body's size [-]: what moves as far in a step has run away
 constexpr double kArmijo = 1e-4;
 constexpr int kHalvings = 20;
 constexpr double kReach = 0.25;      // of the body's size [-]: what is nearer than that is watched
@@ -38,9 +35,8 @@ constexpr double kRounding = 1e-12;  // of the potential [-]: a smaller decrease
 template <int Dim>
 class EulerStepper final : public StepperOf<Dim> {
  public:
-  EulerStepper(const SceneOf<Dim>& scene, bool takes_unsolved)
+  explicit EulerStepper(const SceneOf<Dim>& scene)
       : scene_(scene),
-        takes_unsolved_(takes_unsolved),
         forces_(scene.body),
         matrix_(scene.body),
         contact_(scene),
@@ -98,10 +94,7 @@ class EulerStepper final : public StepperOf<Dim> {
     if (contact_.is_needed()) contact_.update_friction(state.x);
     find_residual(state.x, dt);
     book(dt, effect_force, state, impulses);
-    const bool is_solved = residual_speed(dt) <= kGivenUp * size_;
-    const bool is_near = (state.x - start_.x).colwise().norm().maxCoeff() < kRunaway * size_;
-    if (!is_solved && takes_unsolved_ && is_near) take_way_as_velocity(dt, state, impulses);
-    if (!state.v.allFinite() || (!is_solved && !(takes_unsolved_ && is_near))) {
+    if (!state.v.allFinite() || !(residual_speed(dt) <= kGivenUp * size_)) {
       state = start_;
       return Termination::kDiverged;
     }
@@ -206,23 +199,7 @@ class EulerStepper final : public StepperOf<Dim> {
     }
   }
 
-  /// Where no end was found the forces are not those of the motion. The way is downhill and gives the velocities, and what
-  /// all nodes share of it is set right by what was booked. Held nodes take up the rest.
-  void take_way_as_velocity(double dt, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
-    const BodyOf<Dim>& body = scene_.body;
-    const VectorOf<Dim> booked = momentum(body, start_.v) + impulses.contact_nodes.rowwise().sum() +
-                                 impulses.effect_nodes.rowwise().sum() + dt * body.mass.sum() * scene_.gravity;
-    state.v = (state.x - start_.x) / dt;
-    const VectorOf<Dim> missing = booked - momentum(body, state.v);
-    if (body.held.empty()) {
-      state.v.colwise() += missing / body.mass.sum();
-    } else {
-      impulses.hold.colwise() = -missing / static_cast<double>(body.held.size());
-    }
-  }
-
   const SceneOf<Dim>& scene_;
-  bool takes_unsolved_;
   InternalForces<Dim> forces_;
   SystemMatrixOf<Dim> matrix_;
   PenaltyContact<Dim> contact_;
@@ -237,15 +214,9 @@ class EulerStepper final : public StepperOf<Dim> {
 
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_euler_stepper(const SceneOf<Dim>& scene) {
-  return std::make_unique<EulerStepper<Dim>>(scene, false);
-}
-template <int Dim>
-std::unique_ptr<StepperOf<Dim>> make_forgiving_euler_stepper(const SceneOf<Dim>& scene) {
-  return std::make_unique<EulerStepper<Dim>>(scene, true);
+  return std::make_unique<EulerStepper<Dim>>(scene);
 }
 template std::unique_ptr<StepperOf<2>> make_euler_stepper<2>(const SceneOf<2>&);
 template std::unique_ptr<StepperOf<3>> make_euler_stepper<3>(const SceneOf<3>&);
-template std::unique_ptr<StepperOf<2>> make_forgiving_euler_stepper<2>(const SceneOf<2>&);
-template std::unique_ptr<StepperOf<3>> make_forgiving_euler_stepper<3>(const SceneOf<3>&);
 
 }  // namespace hydrostat::physics

@@ -2,15 +2,28 @@
 #include <cmath>
 
 #include "physics/elastic_forces.h"
-#include "physics/euler.h"
 #include "physics/internal_forces.h"
 #include "physics/stepper.h"
 
 namespace hydrostat::physics {
 namespace {
 
-constexpr double kFaster = 1.25;  // kinetic energy over that at the start and the work [-]: less is not looked into
-constexpr double kCalm = 0.01;    // of the energy of a body as fast as push_out_speed: less is never too much
+constexpr double kFaster = 1.25;   // kinetic energy over that at the start and the work [-]: less is not looked into
+constexpr double kCalm = 0.01;     // of the energy of a body as fast as push_out_speed: less is never too much
+constexpr int kMostHalvings = 6;   // of euler's step where its solver finds no end
+
+/// The booked impulses of a step's parts, summed.
+template <int Dim>
+void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum) {
+  sum.contact += part.contact;
+  sum.contact_nodes += part.contact_nodes;
+  sum.contact_moment += part.contact_moment;
+  sum.effect_nodes += part.effect_nodes;
+  sum.effect_moment += part.effect_moment;
+  sum.gravity_moment += part.gravity_moment;
+  sum.hold += part.hold;
+  sum.obstacle_work += part.obstacle_work;
+}
 
 /// An accurate method with euler behind it: sound steps are the accurate method's own, to the bit.
 ///
@@ -78,14 +91,31 @@ class GuardedStepper final : public StepperOf<Dim> {
 
   Termination take_over(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                         ImpulsesOf<Dim>& impulses) {
-    if (euler_ == nullptr) euler_ = make_forgiving_euler_stepper(scene_);
-    if (!is_guarding_) euler_->forget();
+    if (euler_ == nullptr) {
+      euler_ = make_euler_stepper(scene_);
+      part_ = impulses;
+    }
     ++guard_steps_;
     starts_unknown_ = true;
+    for (int halvings = 0; halvings <= kMostHalvings; ++halvings) {
+      if (!is_guarding_ || halvings > 0) euler_->forget();
+      const int parts = 1 << halvings;
+      clear(impulses);
+      Termination termination = Termination::kDone;
+      for (int k = 0; k < parts && termination == Termination::kDone; ++k) {
+        termination = euler_->step(dt / parts, activation, effect_force, state, part_);
+        add(part_, impulses);
+      }
+      if (termination == Termination::kDone) {
+        is_guarding_ = true;
+        accurate_->forget();
+        return Termination::kDone;
+      }
+      state = start_;
+    }
+    is_guarding_ = false;
     accurate_->forget();
-    const Termination termination = euler_->step(dt, activation, effect_force, state, impulses);
-    is_guarding_ = termination == Termination::kDone;
-    return termination;
+    return Termination::kDiverged;
   }
 
   const SceneOf<Dim>& scene_;
@@ -93,6 +123,7 @@ class GuardedStepper final : public StepperOf<Dim> {
   double growth_;  // of the energy [-] in a step beyond the work on the body
   InternalForces<Dim> forces_;
   StateOf<Dim> start_;
+  ImpulsesOf<Dim> part_;
   double calm_energy_;          // [J]
   bool starts_unknown_ = true;  // whether the state from which the next step starts is sound
   bool is_guarding_ = false;    // the last step was euler's

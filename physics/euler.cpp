@@ -18,7 +18,7 @@ constexpr double kShorterUpdate = 0.7;
 // A node's residual force is told as the velocity that it would give the node in a step, over the body's size [1/s].
 constexpr double kResidual = 1e-4;      // small enough
 constexpr double kInnerDecrease = 0.3;  // of the residual [-] between two updates of the friction limits
-constexpr double kGivenUp = 1e-2;       // after the last iterate: no solution was found
+constexpr double kGivenUp = 1e-2;       // after the last iterate: no minimum was found
 constexpr double kArmijo = 1e-4;
 constexpr int kHalvings = 20;
 constexpr double kReach = 0.25;      // of the body's size [-]: what is nearer than that is watched
@@ -71,7 +71,9 @@ class EulerStepper final : public StepperOf<Dim> {
       contact_.begin(start_, foreseen_, dt, reach(dt));
       contact_.update_friction(state.x);
     }
-    state.x = potential(trial_, dt) < potential(state.x, dt) ? trial_ : state.x;
+    const double potential_here = potential(state.x, dt), potential_there = potential(trial_, dt);
+    if (potential_there < potential_here) state.x = trial_;
+    const double potential_at_first = std::min(potential_here, potential_there);
     find_residual(state.x, dt);
     double enough = kResidual * size_, part = 1, last = std::numeric_limits<double>::infinity();
     for (int k = 0, updates = 0; k < kNewtonSteps; ++k) {
@@ -94,7 +96,10 @@ class EulerStepper final : public StepperOf<Dim> {
     if (contact_.is_needed()) contact_.update_friction(state.x);
     find_residual(state.x, dt);
     book(dt, effect_force, state, impulses);
-    if (!state.v.allFinite() || !(residual_speed(dt) <= kGivenUp * size_)) {
+    const bool is_solved = residual_speed(dt) <= kGivenUp * size_;
+    const bool is_lower = is_solved || potential(state.x, dt) <= potential_at_first;
+    if (!is_solved && is_lower) follow_places(dt, state, impulses);
+    if (!is_lower || !state.v.allFinite() || !state.x.allFinite()) {
       state = start_;
       return Termination::kDiverged;
     }
@@ -196,6 +201,21 @@ class EulerStepper final : public StepperOf<Dim> {
       const int node = body.held[n];
       impulses.hold.col(static_cast<Eigen::Index>(n)) = -body.mass[node] * state.v.col(node);
       state.v.col(node).setZero();
+    }
+  }
+
+  /// Where the search ended above the minimum the velocities are those of the places, which lowered the potential and thus
+  /// gained no energy, and what the forces leave unexplained counts as forces inside the body: all but its sum, which a common
+  /// velocity takes back (or what holds the held nodes), so that momentum balances as ever.
+  void follow_places(double dt, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
+    const BodyOf<Dim>& body = scene_.body;
+    const VectorOf<Dim> booked = momentum<Dim>(body, state.v);
+    state.v = (state.x - start_.x) / dt;
+    const VectorOf<Dim> missing = booked - momentum<Dim>(body, state.v);
+    if (body.held.empty()) {
+      state.v.colwise() += missing / body.mass.sum();
+    } else {
+      impulses.hold.colwise() -= missing / static_cast<double>(body.held.size());
     }
   }
 

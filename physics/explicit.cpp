@@ -9,7 +9,6 @@ namespace hydrostat::physics {
 namespace {
 
 constexpr double kStepMargin = 0.8;    // of the linear stability bound
-constexpr double kMostSubsteps = 1e5;  // of a step: a shape that wants more has run away
 
 struct StiffestMode {
   double damping;            // [1/s]
@@ -56,13 +55,14 @@ StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body, const InternalForces
 template <int Dim>
 class ExplicitStepper final : public StepperOf<Dim> {
  public:
-  explicit ExplicitStepper(const SceneOf<Dim>& scene)
+  ExplicitStepper(const SceneOf<Dim>& scene, double most_substeps)
       : scene_(scene),
         forces_(scene.body),
         force_(Dim, scene.body.node_count()),
         inverse_mass_(scene.body.mass.cwiseInverse()),
         contact_(scene),
-        is_between_(!scene.body.elements.empty()) {
+        is_between_(!scene.body.elements.empty()),
+        most_substeps_(most_substeps) {
     mode_at_rest_ = stiffest_mode_at_rest(scene.body, forces_);
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
@@ -77,7 +77,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
     StiffestMode mode = mode_at_rest_;
     mode.frequency_squared *= forces_.stiffening(state.x);
     const double count = std::ceil(dt / (kStepMargin * longest_substep(mode)));
-    if (!(count <= kMostSubsteps)) return Termination::kDiverged;
+    if (!(count <= most_substeps_)) return Termination::kDiverged;
     const int substeps = static_cast<int>(count);
     const double h = dt / substeps;
     clear(impulses);
@@ -145,6 +145,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
   Eigen::VectorXd inverse_mass_;
   ImpulseContact<Dim> contact_;
   bool is_between_;  // substeps take their forces between the places that the steps tell
+  double most_substeps_;
   StateOf<Dim> start_;
   StiffestMode mode_at_rest_{};  // of the body at rest
   double shortest_edge_ = 0;     // [m]
@@ -153,10 +154,10 @@ class ExplicitStepper final : public StepperOf<Dim> {
 }  // namespace
 
 template <int Dim>
-std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene) {
-  return std::make_unique<ExplicitStepper<Dim>>(scene);
+std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene, double most_substeps) {
+  return std::make_unique<ExplicitStepper<Dim>>(scene, most_substeps);
 }
-template std::unique_ptr<StepperOf<2>> make_explicit_stepper<2>(const SceneOf<2>&);
-template std::unique_ptr<StepperOf<3>> make_explicit_stepper<3>(const SceneOf<3>&);
+template std::unique_ptr<StepperOf<2>> make_explicit_stepper<2>(const SceneOf<2>&, double);
+template std::unique_ptr<StepperOf<3>> make_explicit_stepper<3>(const SceneOf<3>&, double);
 
 }  // namespace hydrostat::physics

@@ -3,6 +3,7 @@
 
 #include "physics/elastic_forces.h"
 #include "physics/internal_forces.h"
+#include "physics/recovery.h"
 #include "physics/stepper.h"
 
 namespace hydrostat::physics {
@@ -11,19 +12,6 @@ namespace {
 constexpr double kFaster = 1.25;   // kinetic energy over that at the start and the work [-]: less is not looked into
 constexpr double kCalm = 0.01;     // of the energy of a body as fast as push_out_speed: less is never too much
 constexpr int kMostHalvings = 6;   // of euler's step where its solver finds no end
-
-/// The booked impulses of a step's parts, summed.
-template <int Dim>
-void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum) {
-  sum.contact += part.contact;
-  sum.contact_nodes += part.contact_nodes;
-  sum.contact_moment += part.contact_moment;
-  sum.effect_nodes += part.effect_nodes;
-  sum.effect_moment += part.effect_moment;
-  sum.gravity_moment += part.gravity_moment;
-  sum.hold += part.hold;
-  sum.obstacle_work += part.obstacle_work;
-}
 
 /// An accurate method with euler behind it: sound steps are the accurate method's own, to the bit.
 ///
@@ -46,15 +34,17 @@ class GuardedStepper final : public StepperOf<Dim> {
   long guard_steps() const override { return guard_steps_; }
   void forget() override {
     accurate_->forget();
+    if (euler_ != nullptr) euler_->forget();
     starts_unknown_ = true;
+    is_guarding_ = false;
   }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     start_ = state;
-    const bool is_inverted = starts_unknown_ && has_inverted(state.x);
+    const bool is_broken = (euler_ != nullptr && euler_->is_recovering()) || (starts_unknown_ && has_inverted(state.x));
     starts_unknown_ = false;
-    if (!is_inverted && accurate_->step(dt, activation, effect_force, state, impulses) == Termination::kDone &&
+    if (!is_broken && accurate_->step(dt, activation, effect_force, state, impulses) == Termination::kDone &&
         is_sound(activation, state, impulses)) {
       is_guarding_ = false;
       return Termination::kDone;
@@ -92,7 +82,7 @@ class GuardedStepper final : public StepperOf<Dim> {
   Termination take_over(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                         ImpulsesOf<Dim>& impulses) {
     if (euler_ == nullptr) {
-      euler_ = make_euler_stepper(scene_);
+      euler_ = std::make_unique<RecoveringStepper<Dim>>(scene_, make_euler_stepper(scene_));
       part_ = impulses;
     }
     ++guard_steps_;
@@ -119,7 +109,8 @@ class GuardedStepper final : public StepperOf<Dim> {
   }
 
   const SceneOf<Dim>& scene_;
-  std::unique_ptr<StepperOf<Dim>> accurate_, euler_;  // euler from its first step on
+  std::unique_ptr<StepperOf<Dim>> accurate_;
+  std::unique_ptr<RecoveringStepper<Dim>> euler_;  // from its first step on
   double growth_;  // of the energy [-] in a step beyond the work on the body
   InternalForces<Dim> forces_;
   StateOf<Dim> start_;

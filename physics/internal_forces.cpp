@@ -7,6 +7,11 @@
 #include "physics/element_forces.h"
 
 namespace hydrostat::physics {
+namespace {
+
+constexpr double kMostActivation = 100;  // what is longer is a fault of whoever commands it [-]
+
+}  // namespace
 
 template <int Dim>
 InternalForces<Dim>::InternalForces(const BodyOf<Dim>& body)
@@ -21,6 +26,7 @@ InternalForces<Dim>::InternalForces(const BodyOf<Dim>& body)
 
 template <int Dim>
 bool InternalForces<Dim>::set_activation(const Eigen::VectorXd& activation) {
+  if (!(activation.array().abs() <= kMostActivation).all()) return false;
   if (active_.empty() || activation != activation_) {
     activation_ = activation;
     for (std::size_t n = 0; n < active_.size(); ++n) {

@@ -13,8 +13,8 @@ class InternalForces {
  public:
   explicit InternalForces(const BodyOf<Dim>& body);
 
-  /// Holds the activations [-], E, for what follows; to be called before it. False: elements have no shape for them, for one
-  /// is not above 0 or not finite.
+  /// Holds the activations [-], E, for what follows; to be called before it. False: one is not finite
+  /// or beyond 100, or elements have no shape for them, for one is not above 0.
   bool set_activation(const Eigen::VectorXd& activation);
   const Eigen::VectorXd& activation() const { return activation_; }
 

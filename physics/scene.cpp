@@ -31,6 +31,18 @@ void clear(ImpulsesOf<Dim>& impulses) {
 }
 
 template <int Dim>
+void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum) {
+  sum.contact += part.contact;
+  sum.contact_nodes += part.contact_nodes;
+  sum.contact_moment += part.contact_moment;
+  sum.effect_nodes += part.effect_nodes;
+  sum.effect_moment += part.effect_moment;
+  sum.gravity_moment += part.gravity_moment;
+  sum.hold += part.hold;
+  sum.obstacle_work += part.obstacle_work;
+}
+
+template <int Dim>
 double push_out_speed(const SceneOf<Dim>& scene) {
   const double gravity = scene.gravity.norm();
   return 0.25 * std::sqrt((gravity > 0 ? gravity : 9.81) * size_of_volume<Dim>(scene.body.rest_volume.sum()));
@@ -83,6 +95,7 @@ void touch_with_whole_surface(SceneOf<Dim>& scene) {
 #define HYDROSTAT_INSTANTIATE(Dim)                                  \
   template ImpulsesOf<Dim> make_impulses<Dim>(const SceneOf<Dim>&); \
   template void clear<Dim>(ImpulsesOf<Dim>&);                       \
+  template void add<Dim>(const ImpulsesOf<Dim>&, ImpulsesOf<Dim>&); \
   template double push_out_speed<Dim>(const SceneOf<Dim>&);         \
   template void touch_with_whole_surface<Dim>(SceneOf<Dim>&);
 HYDROSTAT_INSTANTIATE(2)

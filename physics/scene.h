@@ -41,6 +41,9 @@ ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene);
 /// Sets all to zero.
 template <int Dim>
 void clear(ImpulsesOf<Dim>& impulses);
+/// Adds those of a part of the step.
+template <int Dim>
+void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum);
 
 /// At which what starts inside an obstacle is lifted out [m/s]: a quarter of the root of g D, gravity 9.81 where there is
 /// none.

@@ -4,6 +4,8 @@
 namespace hydrostat::physics {
 namespace {
 
+constexpr double kMostSubsteps = 1e5;  // of a step: nothing else takes over
+
 /// The same scene with a body that is springs and dashpots along its edges, and nothing else. An element's pairs get springs
 /// that together hold as much as it (make_body's rule, shared out over its pairs): Poisson's ratio is that of central forces.
 template <int Dim>
@@ -33,7 +35,7 @@ template <int Dim>
 class SpringStepper final : public StepperOf<Dim> {
  public:
   explicit SpringStepper(const SceneOf<Dim>& scene)
-      : scene_(scene), springs_(springs_alone(scene)), stepper_(make_explicit_stepper(springs_)) {}
+      : scene_(scene), springs_(springs_alone(scene)), stepper_(make_explicit_stepper(springs_, kMostSubsteps)) {}
 
   double substep(double dt) const override { return stepper_->substep(dt); }
 

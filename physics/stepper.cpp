@@ -1,5 +1,7 @@
 #include "physics/stepper.h"
 
+#include "physics/recovery.h"
+
 namespace hydrostat::physics {
 namespace {
 
@@ -39,7 +41,7 @@ std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& 
     case Method::kExplicit:
       return make_guarded_stepper(scene, make_explicit_stepper(scene), kExplicitGrowth);
     case Method::kEuler:
-      return make_euler_stepper(scene);
+      return std::make_unique<RecoveringStepper<Dim>>(scene, make_euler_stepper(scene));
     case Method::kImplicit:
       return make_guarded_stepper(scene, make_implicit_stepper(scene), kImplicitGrowth);
     case Method::kXpbd:

@@ -45,8 +45,9 @@ template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate,
                                                      double growth);
 
+/// Its steps diverge where the stability bound asks for more than `most_substeps`.
 template <int Dim>
-std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene);
+std::unique_ptr<StepperOf<Dim>> make_explicit_stepper(const SceneOf<Dim>& scene, double most_substeps = 2000);
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_euler_stepper(const SceneOf<Dim>& scene);
 template <int Dim>

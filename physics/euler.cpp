@@ -187,7 +187,10 @@ class EulerStepper final : public StepperOf<Dim> {
   void book(double dt, const PointsOf<Dim>* effect_force, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
     const BodyOf<Dim>& body = scene_.body;
     clear(impulses);
-    if (contact_.is_needed()) contact_.book(dt, state.x, impulses);
+    if (contact_.is_needed()) {
+      contact_.book(dt, state.x, impulses);
+      impulses.obstacle_work += contact_.lift_work();
+    }
     if (effect_force != nullptr) {
       impulses.effect_nodes = dt * *effect_force;
       for (int i = 0; i < body.node_count(); ++i) {

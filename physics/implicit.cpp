@@ -288,7 +288,10 @@ class ImplicitStepper final : public StepperOf<Dim> {
   void book(const PointsOf<Dim>* effect_force, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
     const BodyOf<Dim>& body = scene_.body;
     clear(impulses);
-    if (contact_.is_needed()) contact_.book(0.5 * dt_, start_.x, impulses);
+    if (contact_.is_needed()) {
+      contact_.book(0.5 * dt_, start_.x, impulses);
+      impulses.obstacle_work += 0.5 * contact_.lift_work();
+    }
     middle_ = 0.5 * (start_.x + state.x);
     if (effect_force != nullptr) {
       impulses.effect_nodes = dt_ * *effect_force;

@@ -32,7 +32,6 @@ void PenaltyContact<Dim>::forget() {
 
 template <int Dim>
 void PenaltyContact<Dim>::begin(const StateOf<Dim>& start, const PointsOf<Dim>& foreseen, double dt, double reach) {
-  dt_ = dt;
   touches_.clear();
   travel_ = start.obstacle_travel;
   set_.move_obstacles(dt, travel_);
@@ -57,13 +56,16 @@ void PenaltyContact<Dim>::lay_anchor(const StateOf<Dim>& start, double dt, Touch
   if (goes_on) touch.anchor -= stretch_.col(slot);
   VectorOf<Dim> normal;
   double deep = depth_at_rest_[slot];
-  if (!goes_on) {
-    touch.depth_at_rest = 0;
+  touch.depth_at_rest = 0;
+  if (!goes_on || deep > 0) {
     // The surface as it was when the step began.
-    deep = std::max(0.0, depth(touch, start.x, normal) - dt * normal.dot(set_.velocity(touch.contact)));
+    const double below = std::max(0.0, depth(touch, start.x, normal) - dt * normal.dot(set_.velocity(touch.contact)));
+    if (!goes_on) deep = below;
+    const double lift = std::min(deep, dt * push_out_speed_), pressed = std::max(0.0, below - deep);
+    touch.lift_work = stiffness_ * (pressed + 0.5 * lift) * lift;
+    deep -= lift;
   }
-  touch.lift = std::min(deep, dt * push_out_speed_);
-  touch.depth_at_rest = deep - touch.lift;
+  touch.depth_at_rest = deep;
 }
 
 /// Of the place below its spring's rest [m]; negative where it is free.
@@ -150,6 +152,13 @@ void PenaltyContact<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, S
 }
 
 template <int Dim>
+double PenaltyContact<Dim>::lift_work() const {
+  double sum = 0;
+  for (const Touch& touch : touches_) sum += touch.lift_work;
+  return sum;
+}
+
+template <int Dim>
 void PenaltyContact<Dim>::book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim>& impulses) const {
   for (const Touch& touch : touches_) {
     const ContactOf<Dim>& contact = touch.contact;
@@ -163,7 +172,7 @@ void PenaltyContact<Dim>::book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim
       impulses.contact_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
     }
     impulses.contact_moment += cross<Dim>(place, impulse);
-    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + (touch.lift / dt_) * contact.normal);
+    impulses.obstacle_work += impulse.dot(set_.velocity(contact));
   }
 }
 

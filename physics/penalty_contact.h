@@ -31,6 +31,8 @@ class PenaltyContact {
   void stop_approach(const PointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass, PointsOf<Dim>& v);
   /// Books the forces of the last add_forces, as acting for dt at the places of `x`.
   void book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim>& impulses) const;
+  /// Done on the body by what lifts it out of obstacles in which it started [J].
+  double lift_work() const;
   /// The step is done: drags the anchors, moves the obstacles.
   void end(const PointsOf<Dim>& x, PointsOf<Dim>& obstacle_travel);
 
@@ -40,7 +42,7 @@ class PenaltyContact {
     VectorOf<Dim> anchor, friction_normal, force;
     double limit = 0, last_limit = 0;  // [N] of friction
     double depth_at_rest = 0;          // [m] below the surface where the normal spring ends
-    double lift = 0;                   // [m] by which that has moved up in this step
+    double lift_work = 0;              // [J] that moving it up in this step stores in the spring
     bool stops = false;                // touches at the end of the step
     double plane_offset = 0;           // of a contact between the points: its surface is held to be a plane
   };
@@ -50,7 +52,7 @@ class PenaltyContact {
 
   ContactSet<Dim> set_;
   double stiffness_ = 0;  // [N/m] of a place, normal and tangential
-  double push_out_speed_ = 0, dt_ = 0;
+  double push_out_speed_ = 0;
   PointsOf<Dim> travel_;  // [m] of the obstacles at the end of the step
   std::vector<Touch> touches_;
   PointsOf<Dim> stretch_;          // [m] Dim x slots, of the friction springs

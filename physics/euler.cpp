@@ -50,6 +50,8 @@ class EulerStepper final : public StepperOf<Dim> {
         start_{scene.body.rest, scene.body.rest} {}
 
   double substep(double dt) const override { return dt; }
+  /// Steps that ended above the minimum.
+  long guard_steps() const override { return unsolved_; }
 
   void forget() override { contact_.forget(); }
 
@@ -71,9 +73,8 @@ class EulerStepper final : public StepperOf<Dim> {
       contact_.begin(start_, foreseen_, dt, reach(dt));
       contact_.update_friction(state.x);
     }
-    const double potential_here = potential(state.x, dt), potential_there = potential(trial_, dt);
-    if (potential_there < potential_here) state.x = trial_;
-    const double potential_at_first = std::min(potential_here, potential_there);
+    state.x = potential(trial_, dt) < potential(state.x, dt) ? trial_ : state.x;
+    bool has_moved = false;
     find_residual(state.x, dt);
     double enough = kResidual * size_, part = 1, last = std::numeric_limits<double>::infinity();
     for (int k = 0, updates = 0; k < kNewtonSteps; ++k) {
@@ -91,15 +92,18 @@ class EulerStepper final : public StepperOf<Dim> {
         enough = std::max(kResidual * size_, kInnerDecrease * residual_speed(dt));
       }
       if (!move_downhill(dt, state.x)) break;
+      has_moved = true;
       find_residual(state.x, dt);
     }
     if (contact_.is_needed()) contact_.update_friction(state.x);
     find_residual(state.x, dt);
     book(dt, effect_force, state, impulses);
     const bool is_solved = residual_speed(dt) <= kGivenUp * size_;
-    const bool is_lower = is_solved || potential(state.x, dt) <= potential_at_first;
-    if (!is_solved && is_lower) follow_places(dt, state, impulses);
-    if (!is_lower || !state.v.allFinite() || !state.x.allFinite()) {
+    if (!is_solved && has_moved) {
+      follow_places(dt, state, impulses);
+      ++unsolved_;
+    }
+    if ((!is_solved && !has_moved) || !state.v.allFinite() || !state.x.allFinite()) {
       state = start_;
       return Termination::kDiverged;
     }
@@ -231,6 +235,7 @@ class EulerStepper final : public StepperOf<Dim> {
   PointsOf<Dim> moved_, trial_, residual_, force_;
   Eigen::VectorXd direction_;
   StateOf<Dim> start_;
+  long unsolved_ = 0;
 };
 
 }  // namespace

@@ -32,24 +32,6 @@ double planned_grip(const PreparedTarget& prepared, double time_s) {
   return 1;
 }
 
-void set_zero(physics::Impulses& sum) {
-  sum.contact.setZero();
-  sum.contact_nodes.setZero();
-  sum.contact_moment.setZero();
-  sum.effect_nodes.setZero();
-  sum.effect_moment.setZero();
-  sum.gravity_moment.setZero();
-}
-
-void add(const physics::Impulses& impulses, physics::Impulses& sum) {
-  sum.contact += impulses.contact;
-  sum.contact_nodes += impulses.contact_nodes;
-  sum.contact_moment += impulses.contact_moment;
-  sum.effect_nodes += impulses.effect_nodes;
-  sum.effect_moment += impulses.effect_moment;
-  sum.gravity_moment += impulses.gravity_moment;
-}
-
 Eigen::Map<const Eigen::VectorXd> column(const Eigen::Matrix3Xd& points) { return {points.data(), points.size()}; }
 
 /// The target's first state; what is played once begins at rest.
@@ -131,7 +113,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);
   input.feed_forward(0, activation_);
-  set_zero(step_impulses_);
+  physics::clear(step_impulses_);
   write_trace(0);
 }
 
@@ -149,7 +131,7 @@ void Run::control() {
 }
 
 physics::Termination Run::advance() {
-  set_zero(step_impulses_);
+  physics::clear(step_impulses_);
   physics::Termination termination = physics::Termination::kDone;
   for (int k = 0; k < options_.steps_per_control; ++k) {
     const double begin = time_s_ + k * options_.step_s;
@@ -157,7 +139,7 @@ physics::Termination Run::advance() {
     const bool has_effect = !pushed.isZero(0);
     if (has_effect) effect_ = (pushed / options_.step_s) * input_.scene.body.mass.transpose();
     termination = stepper_->step(options_.step_s, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
-    add(impulses_, step_impulses_);
+    physics::add(impulses_, step_impulses_);
     if (termination == physics::Termination::kDiverged) break;
   }
   time_s_ += control_s_;

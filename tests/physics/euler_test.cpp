@@ -2,7 +2,8 @@
 
 #include <cmath>
 
-#include "tests/physics/lattice_scene.h"
+#include "physics/internal_forces.h"
+#include "tests/physics/element_method_scene.h"
 
 namespace hydrostat::physics {
 namespace {
@@ -53,6 +54,27 @@ TYPED_TEST(Euler, MovesWithTheVelocitiesThatItBooks) {
     const Eigen::VectorXd activation = random_activation(random, shape, 0.05);
     ASSERT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone) << "step " << k;
     EXPECT_LT(((state.x - before.x) / kDt - state.v).colwise().norm().maxCoeff(), 1.01e-4 * size);  // [m/s]
+  }
+}
+
+TYPED_TEST(Euler, GoesOnFromWhereItFindsNoMinimumAndGainsNothingByIt) {
+  constexpr int Dim = TypeParam::kDim;
+  // Soft elements whose neighbours pull them inside out and outside in at every step: Newton's method does not get to the end.
+  std::mt19937 random(5);
+  const BodyOf<Dim> shape = random_element_body<Dim>(2, Cut::kBoxes, ElasticLaw::kStableNeoHookean);
+  const SceneOf<Dim> scene = in_the_air(shape, false);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_euler_stepper(scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  InternalForces<Dim> forces(scene.body);
+  ASSERT_TRUE(forces.set_activation(passive(shape)));
+  for (unsigned trial = 0; trial < trials(10u); ++trial) {
+    const StateOf<Dim> start{random_points<Dim>(random, shape.node_count(), 0.1), random_points<Dim>(random, shape.node_count(), 1)};
+    StateOf<Dim> state = start;
+    ASSERT_EQ(stepper->step(1.0 / 15, passive(shape), nullptr, state, impulses), Termination::kDone) << trial;
+    EXPECT_LT((momentum<Dim>(shape, state.v) - momentum<Dim>(shape, start.v)).norm(), 1e-9 * shape.mass.sum());
+    EXPECT_LE(kinetic_energy<Dim>(shape, state.v) + forces.elastic_energy(state.x),
+              1.0001 * (kinetic_energy<Dim>(shape, start.v) + forces.elastic_energy(start.x)));
+    stepper->forget();
   }
 }
 

@@ -1,8 +1,7 @@
 // One run of the stability suite: a hard scene, a kind of body, a method, a size; tests/stability/run.sh calls it for all of them.
 //   stability_run list [slice]            the keys of all runs, or of the short ones
 //   stability_run run KEY DIR             runs one; its scene file goes to DIR; a row of stability.csv on standard output
-//   stability_run slice GROUP             all short runs of a group; exit code 1 where one of them fails
-//   stability_run groups                  of the short runs
+//   stability_run slice BODY DIR          all short runs with that kind of body; exit code 1 where one of them fails
 // A run passes when, at its end, no element is inverted, the volume is within 2 % and all is finite; when at no time the energy was
 // above its start and the work done on the body by more than 1 %, or momentum changed by what is not booked; and, where it
 // matters, when it does not creep, lies in nothing and keeps its angular momentum.
@@ -12,7 +11,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <set>
 
 #include "io/scene_file.h"
 #include "retarget/error.h"
@@ -149,13 +147,6 @@ int main(const std::vector<std::string>& arguments) {
     }
     return 0;
   }
-  if (verb == "groups") {
-    std::set<std::string> told;
-    for (const Case& one : all_cases()) {
-      if (one.is_in_slice && told.insert(one.group).second) std::cout << one.group << "\n";
-    }
-    return 0;
-  }
   if (verb == "run" && arguments.size() == 3) {
     for (const Case& one : all_cases()) {
       if (one.key() != arguments[1]) continue;
@@ -168,14 +159,14 @@ int main(const std::vector<std::string>& arguments) {
   if (verb == "slice" && arguments.size() == 3) {
     bool is_well = true;
     for (const Case& one : all_cases()) {
-      if (!one.is_in_slice || one.group != arguments[1]) continue;
+      if (!one.is_in_slice || one.body != arguments[1]) continue;
       const Outcome out = run(one, arguments[2]);
       print(one, out);
       is_well = is_well && is_passed(out);
     }
     return is_well ? 0 : 1;
   }
-  std::cerr << "usage: stability_run list [slice] | groups | run KEY DIR | slice GROUP DIR\n";
+  std::cerr << "usage: stability_run list [slice] | run KEY DIR | slice BODY DIR\n";
   return 2;
 }
 

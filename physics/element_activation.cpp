@@ -207,13 +207,15 @@ Eigen::MatrixXd shape_per_activation(const ActivationFit<Dim>& fit, int element,
 template <int Dim, int Nodes>
 Eigen::MatrixXd force_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
                                      const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation) {
-  return ActiveVariation<Dim, Nodes>(block, fit, element, x, activation).forces() * shape_per_activation(fit, element, activation);
+  return ActiveVariation<Dim, Nodes>(block, fit, element, x, activation).forces() *
+         shape_per_activation(fit, element, activation);
 }
 
 template <int Dim, int Nodes>
 Eigen::RowVectorXd energy_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
                                          const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation) {
-  return ActiveVariation<Dim, Nodes>(block, fit, element, x, activation).energy() * shape_per_activation(fit, element, activation);
+  return ActiveVariation<Dim, Nodes>(block, fit, element, x, activation).energy() *
+         shape_per_activation(fit, element, activation);
 }
 
 }  // namespace

@@ -59,7 +59,8 @@ int edge_between(const Eigen::Matrix2Xi& edges, int a, int b) {
 
 template <int Dim>
 BodyElements<Dim> make_body_elements(const ElementMesh<Dim>& mesh, ElasticLaw law) {
-  return {make_element_block(mesh, law), make_activation_fit(mesh, make_element_constraints(mesh.nodes)), mesh.materials, mesh.fill};
+  return {make_element_block(mesh, law), make_activation_fit(mesh, make_element_constraints(mesh.nodes)), mesh.materials,
+          mesh.fill};
 }
 
 template <int Dim>
@@ -100,11 +101,11 @@ BodyOf<Dim> make_body(const ElementMesh<Dim>& mesh, const Eigen::Matrix<int, Dim
   return body;
 }
 
-#define HYDROSTAT_INSTANTIATE(Dim)                                                                                          \
-  template BodyElements<Dim> make_body_elements<Dim>(const ElementMesh<Dim>&, ElasticLaw);                                  \
-  template ElementMesh<Dim> mesh_of<Dim>(const BodyOf<Dim>&, const BodyElements<Dim>&);                                     \
-  template BodyOf<Dim> make_body<Dim>(const ElementMesh<Dim>&, const ElementBodyOptions&);                                  \
-  template BodyOf<Dim> make_body<Dim>(const ElementMesh<Dim>&, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>&,          \
+#define HYDROSTAT_INSTANTIATE(Dim)                                                                                 \
+  template BodyElements<Dim> make_body_elements<Dim>(const ElementMesh<Dim>&, ElasticLaw);                         \
+  template ElementMesh<Dim> mesh_of<Dim>(const BodyOf<Dim>&, const BodyElements<Dim>&);                            \
+  template BodyOf<Dim> make_body<Dim>(const ElementMesh<Dim>&, const ElementBodyOptions&);                         \
+  template BodyOf<Dim> make_body<Dim>(const ElementMesh<Dim>&, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>&, \
                                       const ElementBodyOptions&);
 HYDROSTAT_INSTANTIATE(2)
 HYDROSTAT_INSTANTIATE(3)

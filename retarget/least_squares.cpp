@@ -89,8 +89,8 @@ ceres::Solver::Options linear_solver_options() {
   return options;
 }
 
-/// The free entries of a problem with coupled_rows: C x - b of those rows, and one square d (x - w)^2 a column of all others.
-/// With the residuals t = C x - b, x = w - C^T t / d of the free columns, and t solves (I + C D^-1 C^T) t = C w - b.
+/// The free entries of a problem with coupled_rows: C x - b of those rows, and one square d (x - w)^2 a column of all
+/// others. With the residuals t = C x - b, x = w - C^T t / d of the free columns, and t solves (I + C D^-1 C^T) t = C w - b.
 class DualSystem {
  public:
   explicit DualSystem(const BoundedLeastSquares& problem)
@@ -107,7 +107,8 @@ class DualSystem {
   }
 
   /// Solves for the columns whose side is 0; a barrier adds weight (x - target)^2, or there is none.
-  void solve(const std::vector<int>& side, const Eigen::VectorXd* barrier_weight, const Eigen::VectorXd* barrier_target, Eigen::VectorXd& x) {
+  void solve(const std::vector<int>& side, const Eigen::VectorXd* barrier_weight, const Eigen::VectorXd* barrier_target,
+             Eigen::VectorXd& x) {
     constexpr int kRefinements = 2;
     Eigen::VectorXd weight = weight_, pull = pull_;
     if (barrier_weight != nullptr) {

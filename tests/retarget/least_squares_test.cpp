@@ -115,9 +115,11 @@ TEST(BoundedLeastSquares, DualFormFindsTheSameEntries) {
     std::mt19937 random(seed);
     std::vector<Eigen::Triplet<double>> entries;
     for (int r = 0; r < kCoupled; ++r) {
-      for (decltype(problem.jacobian)::InnerIterator it(problem.jacobian, r); it; ++it) entries.emplace_back(r, it.col(), 100 * it.value());
+      for (decltype(problem.jacobian)::InnerIterator it(problem.jacobian, r); it; ++it)
+        entries.emplace_back(r, it.col(), 100 * it.value());
     }
-    for (int c = 0; c < kColumns; ++c) entries.emplace_back(kCoupled + c, c == 5 ? 4 : c, c == 5 ? 0.3 : 0.1 + static_cast<double>(random() % 3));
+    for (int c = 0; c < kColumns; ++c)
+      entries.emplace_back(kCoupled + c, c == 5 ? 4 : c, c == 5 ? 0.3 : 0.1 + static_cast<double>(random() % 3));
     entries.emplace_back(kCoupled + 4, 4, 0.0);
     problem.jacobian.resize(kCoupled + kColumns + 1, kColumns);
     entries.emplace_back(kCoupled + kColumns, 5, 0.7);

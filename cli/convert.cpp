@@ -28,14 +28,16 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr const char *kTet = "tet", *kHex = "hex";
+
 struct ConvertOptions {
-  std::string clip_file, out, clip, root_motion = "auto", limit = "auto", method = "auto";
+  std::string clip_file, out, clip, root_motion = "auto", limit = "auto", method = "auto", element = kTet, material = "auto";
   double height = 0;
   int nodes = 0;
   double friction = retarget::CreatureOptions().friction;
   unsigned seed = 0;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool json = false, quiet = false;
+  bool calibrated = false, json = false, quiet = false;
 };
 
 constexpr double kLeastLimit = 0.01, kMostLimit = 0.9;
@@ -50,6 +52,25 @@ std::map<std::string, physics::Method> methods_by_name() {
   return methods;
 }
 const std::map<std::string, physics::Method> kMethods = methods_by_name();
+
+std::map<std::string, retarget::BodyMaterial> materials_by_name() {
+  std::map<std::string, retarget::BodyMaterial> materials;
+  for (const retarget::BodyMaterial material : retarget::kBodyMaterials) materials.emplace(name_of(material), material);
+  return materials;
+}
+const std::map<std::string, retarget::BodyMaterial> kMaterials = materials_by_name();
+
+retarget::BodyMaterial chosen_material(const ConvertOptions& options) {
+  const bool is_hex = options.element == kHex;
+  if (options.material == "auto")
+    return is_hex ? retarget::BodyMaterial::kStableNeoHookean : retarget::CreatureOptions().material;
+  const retarget::BodyMaterial material = kMaterials.at(options.material);
+  if (is_hex && material == retarget::BodyMaterial::kSprings) {
+    throw UsageError("hydrostat convert", "option --material", "springs lie along the edges of tets",
+                     "Give another material, or leave --element out.");
+  }
+  return material;
+}
 
 /// The key of a stage: all that the stage before depends on, and what this one adds.
 template <typename... Values>
@@ -72,6 +93,13 @@ retarget::CreatureOptions creature_options(const ConvertOptions& options) {
   result.root_motion = kRootMotions.at(options.root_motion);
   result.friction = options.friction;
   result.method = kMethods.at(options.method);
+  result.hexahedra = options.element == kHex;
+  result.material = chosen_material(options);
+  result.calibrated = options.calibrated;
+  if (options.calibrated && (result.hexahedra || result.material == retarget::BodyMaterial::kSprings)) {
+    throw UsageError("hydrostat convert", "option --calibrated", "only tets of finite elements are calibrated",
+                     "Give --material stable_neo_hookean or corotated_linear, or leave --calibrated out.");
+  }
   result.threads = options.threads;
   return result;
 }
@@ -144,8 +172,9 @@ retarget::SourceReport source_report(const ConvertOptions& options, const retarg
 retarget::BodyReport body_report(const retarget::Creature& creature) {
   retarget::BodyReport report;
   report.nodes = creature.mesh.node_count();
-  report.elements = static_cast<int>(creature.mesh.tets.cols());
-  report.constraints = static_cast<int>(creature.mesh.edges.cols());
+  const physics::Body& body = creature.scene.body;
+  report.elements = body.elements.empty() ? body.tet_count() : body.elements.front().block.element_count();
+  report.constraints = body.edge_count();
   report.vertices = static_cast<int>(creature.character.skin.vertices.cols());
   report.pieces = retarget::count_pieces(creature.mesh.tets);
   report.bridged_cells = creature.mesh.bridged_cells;
@@ -153,7 +182,8 @@ retarget::BodyReport body_report(const retarget::Creature& creature) {
   report.mass_kg = creature.scene.body.mass.sum();
   report.length_m = creature.length;
   report.size_m = creature.size;
-  report.youngs_modulus_pa = creature.youngs_modulus;
+  report.youngs_modulus_pa =
+      body.elements.empty() ? creature.youngs_modulus : body.elements.front().materials.front().youngs_modulus;
   return report;
 }
 
@@ -163,10 +193,16 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   record.source_sha256 = report.source.sha256;
   record.clip = report.source.clip;
   record.clip_rise_m = performer.clip_rise;
-  record.settings = {{"height", options.height},         {"nodes", std::int64_t{options.nodes}},
-                     {"root-motion", options.root_motion}, {"limit", report.inverse.limit},
+  record.settings = {{"height", options.height},
+                     {"nodes", std::int64_t{options.nodes}},
+                     {"root-motion", options.root_motion},
+                     {"limit", report.inverse.limit},
                      {"limit-chosen-by", options.limit == "auto" ? std::string("auto") : std::string("user")},
-                     {"method", report.accuracy.method},   {"friction", options.friction},
+                     {"element", report.accuracy.element},
+                     {"material", report.accuracy.material},
+                     {"calibrated", options.calibrated},
+                     {"method", report.accuracy.method},
+                     {"friction", options.friction},
                      {"seed", std::int64_t{options.seed}}};
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
@@ -181,8 +217,9 @@ Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
 /// The stages behind the import, in the order of the road; each leaves its result for those behind it.
 class Conversion {
  public:
-  Conversion(const ConvertOptions& options, Stages& stages, io::CreatureWriter& writer)
-      : options_(options), settings_(creature_options(options)), stages_(stages), writer_(writer) {
+  Conversion(const ConvertOptions& options, const retarget::CreatureOptions& settings, Stages& stages,
+             io::CreatureWriter& writer)
+      : options_(options), settings_(settings), stages_(stages), writer_(writer) {
     stages_.use_cache(writer.cache_directory());
   }
 
@@ -205,7 +242,8 @@ class Conversion {
   }
 
   void make_body(const io::ImportedCharacter& imported) {
-    key_ = key_after(key_of(imported), options_.height, options_.nodes);
+    key_ = key_after(key_of(imported), options_.height, options_.nodes, options_.element, name_of(settings_.material),
+                     std::int64_t{settings_.calibrated});
     creature_ = stages_.run("body", key_, [&] { return retarget::make_creature(imported.character, settings_); });
     creature_.scene.ground.friction = options_.friction;  // of the ground, not of the body: what is cached may have another
     key_ = key_after(key_, options_.root_motion);
@@ -219,8 +257,9 @@ class Conversion {
     const physics::Scene& scene = creature_.scene;
     key_ = key_after(key_, options_.friction);
     retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] {
-      return retarget::prepare(motion_.nodes, scene, retarget::bones_of(creature_.contacts), creature_.character.skeleton.names,
-                               creature_.mesh.bone_weights, creature_.length, creature_.size, retarget::prepare_options(motion_));
+      return retarget::prepare(motion_.nodes, retarget::preparation_scene(creature_), retarget::bones_of(creature_.contacts),
+                               creature_.character.skeleton.names, creature_.mesh.bone_weights, creature_.length,
+                               creature_.size, retarget::prepare_options(motion_));
     });
     retarget::InverseOptions inverse_options;
     inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);
@@ -310,11 +349,12 @@ class Conversion {
 int convert(const ConvertOptions& options) {
   const double wished_limit =
       options.limit == "auto" ? 0 : parse_number(options.limit, kLeastLimit, kMostLimit, "hydrostat convert", "--limit");
+  const retarget::CreatureOptions settings = creature_options(options);
   Progress progress(std::cerr, progress_style(options.quiet));
   Stages stages(progress);
   const io::ImportedCharacter imported = stages.run("import", [&] { return import(options); });
   io::CreatureWriter writer(options.out, io::CreatureWriter::Start::afresh);
-  Conversion conversion(options, stages, writer);
+  Conversion conversion(options, settings, stages, writer);
   try {
     conversion.run(imported, wished_limit);
   } catch (const Error& error) {
@@ -342,6 +382,17 @@ void add_convert(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember(kRootMotions))
       ->capture_default_str();
   convert_command->add_option("--limit", options->limit, "Largest |activation - 1|, 0.01 to 0.9, or auto")->capture_default_str();
+  convert_command
+      ->add_option("--element", options->element, "tet, or hex: the cells of the lattice that the tets are cut from")
+      ->check(CLI::IsMember({kTet, kHex}))
+      ->capture_default_str();
+  convert_command
+      ->add_option("--material", options->material,
+                   "What bears the stress: springs, stable_neo_hookean, corotated_linear, or auto")
+      ->check(CLI::IsMember({"auto", "springs", "stable_neo_hookean", "corotated_linear"}))
+      ->capture_default_str();
+  convert_command->add_flag("--calibrated", options->calibrated,
+                            "Tets of finite elements bend as the cells would that they are cut from");
   convert_command->add_option("--method", options->method, "Time integration: auto, explicit or euler")
       ->check(CLI::IsMember(kMethods))
       ->capture_default_str();

@@ -7,6 +7,7 @@
 #include "io/gltf_out.h"
 #include "io/performance_page.h"
 #include "io/report.h"
+#include "retarget/body_material.h"
 #include "retarget/effects.h"
 
 namespace hydrostat::cli {
@@ -47,7 +48,10 @@ void measure(const retarget::Performer& performer, const retarget::SignalSet& si
              retarget::RunReport& report) {
   report.effects = retarget::effects_of(performer, options.replay);
   report.accuracy.method = physics::name_of(options.replay.method);
-  report.accuracy.element = "tet";
+  const auto& elements = performer.scene.body.elements;
+  report.accuracy.element = !elements.empty() && elements.front().block.is_box() ? "hex" : "tet";
+  report.accuracy.material =
+      name_of(elements.empty() ? retarget::BodyMaterial::kSprings : retarget::material_of(elements.front().block.law));
   report.accuracy.dt_s = physics::make_stepper(options.replay.method, performer.scene)->substep(options.replay.step_s);
   report.accuracy.estimated_error_length = retarget::substep_error(performer, signals, options.replay);
   if (options.seed == 0) return;

@@ -94,6 +94,7 @@ void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& sc
   report.effects = retarget::effects_of(scenario, options);
   report.accuracy.method = physics::name_of(options.method);
   report.accuracy.element = scene.element;
+  report.accuracy.material = scene.law;
   report.accuracy.dt_s = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
 }
 

@@ -4,6 +4,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "physics/element_body.h"
+#include "retarget/body_material.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -135,6 +137,41 @@ Eigen::Matrix<int, 6, Eigen::Dynamic> edges_of_tets(const Reader& reader, const 
   return result;
 }
 
+/// A creature's elements are of one material.
+void put_elements(const physics::BodyElements<3>& elements, Json& json) {
+  const physics::ElementMaterial& material = elements.materials.front();
+  json["elements"] = Json::array();
+  for (const auto nodes : elements.block.nodes.colwise())
+    json["elements"].push_back(std::vector<int>(nodes.begin(), nodes.end()));
+  json["element_fill"] = list(elements.fill);
+  json["law"] = name_of(retarget::material_of(elements.block.law));
+  json["density_kg_m3"] = material.density;
+  json["youngs_modulus_pa"] = material.youngs_modulus;
+  json["poissons_ratio"] = material.poissons_ratio;
+}
+
+physics::BodyElements<3> read_elements(const Reader& reader, const Json& json, const physics::Body& body) {
+  physics::ElementMesh<3> mesh;
+  mesh.rest = body.rest;
+  const Json& all = reader.list_at(json, "elements");
+  if (!all.empty() && all[0].size() == 8) {
+    mesh.nodes = reader.columns<int, 8>(json, "elements");
+  } else {
+    mesh.nodes = reader.columns<int, 4>(json, "elements");
+  }
+  mesh.fill = reader.column<double>(json, "element_fill", mesh.nodes.cols());
+  mesh.materials = {{reader.number("density_kg_m3"), reader.number("youngs_modulus_pa"), reader.number("poissons_ratio")}};
+  const std::string broken = physics::broken_rule<3>(mesh);
+  if (!broken.empty()) reader.refuse("'elements'", "break a rule: " + broken);
+  if (physics::make_element_constraints(mesh.nodes).nodes != body.edges)
+    reader.refuse("'edges'", "are not the pairs of nodes of the elements");
+  const Json& law = reader.at(json, "law");
+  for (const physics::ElasticLaw each : {physics::ElasticLaw::kStableNeoHookean, physics::ElasticLaw::kCorotatedLinear}) {
+    if (law == name_of(retarget::material_of(each))) return physics::make_body_elements<3>(mesh, each);
+  }
+  reader.refuse("'law'", "is none that elements have");
+}
+
 }  // namespace
 
 std::string body_text(const retarget::Performer& performer, const std::vector<std::string>& bones, const Eigen::VectorXi& node_bones) {
@@ -155,6 +192,7 @@ std::string body_text(const retarget::Performer& performer, const std::vector<st
   json["rest_length_m"] = list(body.rest_length);
   json["edge_stiffness_n_m"] = list(body.edge_stiffness);
   json["edge_damping_n_s_m"] = list(body.edge_damping);
+  if (!body.elements.empty()) put_elements(body.elements.front(), json);
   json["edge_bones"] = performer.muscles.edge_bone;
   json["muscles"] = performer.muscles.names;
   json["skin"] = {{"vertices", list(performer.skin.vertices)},
@@ -191,13 +229,16 @@ void parse_body(const std::string& text, const std::string& file, retarget::Perf
   body.tets = reader.columns<int, 4>(json, "tets");
   reader.expect_indices(body.tets, body.rest.cols(), "tets");
   body.rest_volume = reader.positive("rest_volume_m3", body.tets.cols());
-  body.volume_stiffness = reader.column<double>(json, "volume_stiffness_j", body.tets.cols());
+  const bool has_elements = json.contains("elements");
+  body.volume_stiffness = reader.column<double>(json, "volume_stiffness_j", has_elements ? 0 : body.tets.cols());
   body.edges = reader.columns<int, 2>(json, "edges");
   reader.expect_indices(body.edges, body.rest.cols(), "edges");
   body.rest_length = reader.positive("rest_length_m", body.edges.cols());
   body.edge_stiffness = reader.column<double>(json, "edge_stiffness_n_m", body.edges.cols());
   body.edge_damping = reader.column<double>(json, "edge_damping_n_s_m", body.edges.cols());
   body.tet_edges = edges_of_tets(reader, body.tets, body.edges);
+  body.elements.clear();
+  if (has_elements) body.elements.push_back(read_elements(reader, json, body));
   performer.mesh.nodes = body.rest;
   performer.mesh.tets = body.tets;
   performer.mesh.edges = body.edges;

@@ -12,6 +12,8 @@ namespace hydrostat::io {
 ///   nodes [[x, y, z]] in the bind pose, mass_kg, bones (names), node_bones (the bone that owns a node most);
 ///   tets [[4 nodes]], rest_volume_m3, volume_stiffness_j;
 ///   edges [[2 nodes]], rest_length_m, edge_stiffness_n_m, edge_damping_n_s_m, edge_bones (bone regions);
+///   where finite elements bear the stress: elements [[4 or 8 nodes]], element_fill, law, density_kg_m3, youngs_modulus_pa,
+///   poissons_ratio;
 ///   muscles (names);
 ///   skin {vertices, triangles, nodes, weights}: vertex v stands at the sum of weights[v] times nodes[v];
 ///   contact_points {vertices, bones, nodes, weights}; patches [{name, points}]: contact points that touch together.

@@ -170,6 +170,7 @@ void fill(Group& group, const retarget::EffectReport& effect) {
 void fill(Group& group, const retarget::AccuracyReport& accuracy) {
   group.add("method", accuracy.method);
   group.add("element", accuracy.element);
+  group.add("material", accuracy.material);
   group.add("dt_s", accuracy.dt_s);
   group.add("estimated_error_length", accuracy.estimated_error_length);
 }

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "io/record_archive.h"
+#include "physics/element_body.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -73,8 +74,8 @@ void name_fields(RecordArchive& archive, ImportedCharacter& imported) {
 
 void name_fields(RecordArchive& archive, retarget::ControlMesh& mesh) {
   archive.fields("nodes", mesh.nodes, "tets", mesh.tets, "edges", mesh.edges, "tet_fill", mesh.tet_fill, "origin",
-                 mesh.origin, "cell_size", mesh.cell_size, "cell_places", mesh.cell_places, "vertex_cells",
-                 mesh.vertex_cells, "bone_weights", mesh.bone_weights, "cells", mesh.cells, "bridged_cells",
+                 mesh.origin, "cell_size", mesh.cell_size, "cell_nodes", mesh.cell_nodes, "cell_places", mesh.cell_places,
+                 "vertex_cells", mesh.vertex_cells, "bone_weights", mesh.bone_weights, "cells", mesh.cells, "bridged_cells",
                  mesh.bridged_cells, "copied_cells", mesh.copied_cells, "pieces", mesh.pieces);
 }
 
@@ -87,11 +88,43 @@ void name_fields(RecordArchive& archive, retarget::ContactPoints& contacts) {
   archive.fields("vertices", contacts.vertices, "bones", contacts.bones, "embedding", contacts.embedding);
 }
 
+void name_fields(RecordArchive& archive, physics::ElementMaterial& material) {
+  archive.fields("density", material.density, "youngs_modulus", material.youngs_modulus, "poissons_ratio",
+                 material.poissons_ratio);
+}
+
+struct ElementRecord {
+  Eigen::MatrixXi nodes;
+  Eigen::VectorXd fill;
+  std::vector<physics::ElementMaterial> materials;
+  physics::ElasticLaw law = physics::ElasticLaw::kStableNeoHookean;
+};
+
+void name_fields(RecordArchive& archive, ElementRecord& elements) {
+  archive.fields("nodes", elements.nodes, "fill", elements.fill, "law", elements.law);
+  archive.list("materials", "material", elements.materials);
+}
+
+/// What the elements are made from; loading makes them again.
+void name_elements(RecordArchive& archive, physics::Body& body) {
+  std::vector<ElementRecord> records;
+  for (const physics::BodyElements<3>& elements : body.elements)
+    records.push_back({elements.block.nodes, elements.fill, elements.materials, elements.block.law});
+  archive.list("elements", "block", records);
+  if (!archive.is_loading()) return;
+  body.elements.clear();
+  for (const ElementRecord& record : records) {
+    body.elements.push_back(
+        physics::make_body_elements<3>({body.rest, record.nodes, record.materials, record.fill}, record.law));
+  }
+}
+
 void name_fields(RecordArchive& archive, physics::Scene& scene) {
   physics::Body& body = scene.body;
   archive.fields("rest", body.rest, "mass", body.mass, "edges", body.edges, "rest_length", body.rest_length,
                  "edge_stiffness", body.edge_stiffness, "edge_damping", body.edge_damping, "tets", body.tets, "tet_edges",
                  body.tet_edges, "rest_volume", body.rest_volume, "volume_stiffness", body.volume_stiffness);
+  name_elements(archive, body);
   archive.fields("point_nodes", scene.contact_points.nodes, "point_weights", scene.contact_points.weights, "ground_normal",
                  scene.ground.normal, "ground_offset", scene.ground.offset, "friction", scene.ground.friction, "has_ground",
                  scene.has_ground, "gravity", scene.gravity);

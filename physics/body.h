@@ -12,6 +12,8 @@ template <int Dim>
 struct BodyElements {
   ElementBlock<Dim> block;
   ActivationFit<Dim> fit;  // of_element names edges of the body: every pair of nodes of an element must be one
+  std::vector<ElementMaterial> materials = {};  // what block was made of, as in ElementMesh
+  Eigen::VectorXd fill = {};
 };
 
 /// A soft body: springs along the edges of a tetrahedral mesh, whose rest lengths are commanded, and volume per tet; beside

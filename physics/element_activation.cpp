@@ -123,44 +123,99 @@ ActiveStrain<Dim> make_active_strain_of(const ElementBlock<Dim>& block) {
   return active;
 }
 
+/// How one element answers to a change of its active shape, at one deformation and activation.
+template <int Dim, int Nodes>
+class ActiveVariation {
+ public:
+  using Variation = ElementVariation<Dim, Nodes>;
+  using Square = SquareMatrix<double, Dim>;
+  using Shape = ActiveShape<Dim, Nodes>;
+  static constexpr int kModes = Variation::kModes;
+
+  ActiveVariation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element, const ConstNodeMatrix<Dim>& x,
+                  const Eigen::VectorXd& activation)
+      : shape_(Shape::of(fit, activation, element)),
+        active_(strain_matrix<Dim>(shape_)),
+        stretch_(active_.stretch()),
+        variation_(block, element, x, active_.inverse(), hourglass_of(shape_)) {}
+
+  /// Derivative of the nodes' forces with respect to the shape's coordinates [N, N/m].
+  Eigen::Matrix<double, Dim * Nodes, Shape::kSize> forces() const {
+    const GradientDerivative<Dim> moduli = variation_.moduli(Definiteness::kExact);
+    const typename Variation::Weights weights = variation_.node_weights();
+    Eigen::Matrix<double, Dim * Nodes, Shape::kSize> result;
+    for (int c = 0; c < Shape::kSize; ++c) {
+      const Square undo = undo_of(c);
+      typename Variation::Change change;
+      change.F = variation_.F() * undo;
+      const Eigen::Matrix<double, Dim * Dim, 1> of_law = moduli * change.F.reshaped();
+      typename Variation::Response response;
+      // The nodes feel the stress through A^-1, which changes too.
+      response.stress = of_law.reshaped(Dim, Dim) + variation_.stress() * undo.transpose();
+      if constexpr (kModes > 0) {
+        if (c >= kStrains<Dim>) change.rest(c - kStrains<Dim>) = 1;
+        const typename Variation::Response of_hourglass = variation_.respond(change);
+        response.stress += of_hourglass.stress;
+        response.force = of_hourglass.force;
+      }
+      for (int n = 0; n < Nodes; ++n) {
+        Eigen::Matrix<double, Dim, 1> force = response.stress * weights.row(n).template head<Dim>().transpose();
+        if constexpr (kModes > 0) force += response.force * weights.row(n).template tail<kModes>().transpose();
+        result.col(c).template segment<Dim>(Dim * n) = -force;
+      }
+    }
+    return result;
+  }
+
+  /// Derivative of the energy with respect to the shape's coordinates [J, N].
+  Eigen::Matrix<double, 1, Shape::kSize> energy() const {
+    Eigen::Matrix<double, 1, Shape::kSize> result;
+    for (int c = 0; c < kStrains<Dim>; ++c) result[c] = variation_.stress().cwiseProduct(variation_.F() * undo_of(c)).sum();
+    if constexpr (kModes > 0) {
+      for (int k = 0; k < Dim * kModes; ++k) result[kStrains<Dim> + k] = -variation_.hourglass_force()(k);
+    }
+    return result;
+  }
+
+ private:
+  static typename Variation::Hourglass hourglass_of(const typename Shape::Coordinates& shape) {
+    typename Variation::Hourglass rest;
+    for (int k = 0; k < Dim * kModes; ++k) rest(k) = shape[kStrains<Dim> + k];
+    return rest;
+  }
+  /// A dA^-1 for a unit of coordinate c: what it does to F from behind.
+  Square undo_of(int c) const {
+    if (c >= kStrains<Dim>) return Square::Zero();
+    const typename Shape::Coordinates unit = Shape::Coordinates::Unit(c);
+    return stretch_ * active_.change_of_inverse(strain_matrix<Dim>(unit));
+  }
+
+  typename Shape::Coordinates shape_;
+  ActiveStretch<Dim> active_;
+  Square stretch_;
+  Variation variation_;
+};
+
+/// Of the shape's coordinates with respect to the activations [1, m].
+template <int Dim>
+Eigen::MatrixXd shape_per_activation(const ActivationFit<Dim>& fit, int element, const Eigen::VectorXd& activation) {
+  Eigen::MatrixXd result = fit.maps[static_cast<std::size_t>(fit.map_of_element[element])];
+  for (int pair = 0; pair < result.cols(); ++pair) result.col(pair) /= activation[fit.of_element(pair, element)];
+  return result;
+}
+
 template <int Dim, int Nodes>
 Eigen::MatrixXd force_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
                                      const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation) {
-  using Variation = ElementVariation<Dim, Nodes>;
-  using Square = SquareMatrix<double, Dim>;
-  constexpr int kModes = Variation::kModes;
-  const auto shape = ActiveShape<Dim, Nodes>::of(fit, activation, element);
-  const ActiveStretch<Dim> active(strain_matrix<Dim>(shape));
-  typename Variation::Hourglass rest;
-  for (int k = 0; k < Dim * kModes; ++k) rest(k) = shape[kStrains<Dim> + k];
-  const Variation variation(block, element, x, active.inverse(), rest);
-  const GradientDerivative<Dim> moduli = variation.moduli(Definiteness::kExact);
-  const typename Variation::Weights weights = variation.node_weights();
-  const Square stretch = active.stretch();
-  const Eigen::MatrixXd& map = fit.maps[static_cast<std::size_t>(fit.map_of_element[element])];
-  Eigen::MatrixXd result(Dim * Nodes, map.cols());
-  for (int pair = 0; pair < map.cols(); ++pair) {
-    const Square undo = stretch * active.change_of_inverse(strain_matrix<Dim>(map.col(pair)));
-    typename Variation::Change change;
-    change.F = variation.F() * undo;
-    const Eigen::Matrix<double, Dim * Dim, 1> of_law = moduli * change.F.reshaped();
-    typename Variation::Response response;
-    // The nodes feel the stress through A^-1, which changes too.
-    response.stress = of_law.reshaped(Dim, Dim) + variation.stress() * undo.transpose();
-    if constexpr (kModes > 0) {
-      for (int k = 0; k < Dim * kModes; ++k) change.rest(k) = map(kStrains<Dim> + k, pair);
-      const typename Variation::Response of_hourglass = variation.respond(change);
-      response.stress += of_hourglass.stress;
-      response.force = of_hourglass.force;
-    }
-    const double per_activation = 1 / activation[fit.of_element(pair, element)];
-    for (int n = 0; n < Nodes; ++n) {
-      Eigen::Matrix<double, Dim, 1> force = response.stress * weights.row(n).template head<Dim>().transpose();
-      if constexpr (kModes > 0) force += response.force * weights.row(n).template tail<kModes>().transpose();
-      result.col(pair).segment<Dim>(Dim * n) = -per_activation * force;
-    }
-  }
-  return result;
+  return ActiveVariation<Dim, Nodes>(block, fit, element, x, activation).forces() *
+         shape_per_activation(fit, element, activation);
+}
+
+template <int Dim, int Nodes>
+Eigen::RowVectorXd energy_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
+                                         const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation) {
+  return ActiveVariation<Dim, Nodes>(block, fit, element, x, activation).energy() *
+         shape_per_activation(fit, element, activation);
 }
 
 }  // namespace
@@ -207,6 +262,13 @@ Eigen::MatrixXd element_force_per_activation(const ElementBlock<Dim>& block, con
                         : force_per_activation<Dim, Dim + 1>(block, fit, element, x, activation);
 }
 
+template <int Dim>
+Eigen::RowVectorXd element_energy_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
+                                                 const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation) {
+  return block.is_box() ? energy_per_activation<Dim, 1 << Dim>(block, fit, element, x, activation)
+                        : energy_per_activation<Dim, Dim + 1>(block, fit, element, x, activation);
+}
+
 template ActivationFit<2> make_activation_fit<2>(const ElementMesh<2>&, const ElementConstraints&);
 template ActivationFit<3> make_activation_fit<3>(const ElementMesh<3>&, const ElementConstraints&);
 template ActiveStrain<2> make_active_strain<2>(const ElementBlock<2>&);
@@ -217,5 +279,9 @@ template Eigen::MatrixXd element_force_per_activation<2>(const ElementBlock<2>&,
                                                          const ConstNodeMatrix<2>&, const Eigen::VectorXd&);
 template Eigen::MatrixXd element_force_per_activation<3>(const ElementBlock<3>&, const ActivationFit<3>&, int,
                                                          const ConstNodeMatrix<3>&, const Eigen::VectorXd&);
+template Eigen::RowVectorXd element_energy_per_activation<2>(const ElementBlock<2>&, const ActivationFit<2>&, int,
+                                                             const ConstNodeMatrix<2>&, const Eigen::VectorXd&);
+template Eigen::RowVectorXd element_energy_per_activation<3>(const ElementBlock<3>&, const ActivationFit<3>&, int,
+                                                             const ConstNodeMatrix<3>&, const Eigen::VectorXd&);
 
 }  // namespace hydrostat::physics

@@ -43,5 +43,9 @@ bool set_activation(const ActivationFit<Dim>& fit, const Eigen::VectorXd& activa
 template <int Dim>
 Eigen::MatrixXd element_force_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
                                              const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation);
+/// The same of its energy [J].
+template <int Dim>
+Eigen::RowVectorXd element_energy_per_activation(const ElementBlock<Dim>& block, const ActivationFit<Dim>& fit, int element,
+                                                 const ConstNodeMatrix<Dim>& x, const Eigen::VectorXd& activation);
 
 }  // namespace hydrostat::physics

@@ -30,21 +30,16 @@ Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> tets_of_box() {
 }
 
 template <int Dim>
-void fill_with_tets(const ElementMesh<Dim>& mesh, bool is_box, BodyOf<Dim>& body) {
-  if (!is_box) {
-    body.tets = mesh.nodes;
-  } else {
-    const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> parts = tets_of_box<Dim>();
-    body.tets.resize(Dim + 1, parts.cols() * mesh.nodes.cols());
-    for (Eigen::Index e = 0; e < mesh.nodes.cols(); ++e) {
-      for (Eigen::Index p = 0; p < parts.cols(); ++p) {
-        for (int k = 0; k <= Dim; ++k) body.tets(k, parts.cols() * e + p) = mesh.nodes(parts(k, p), e);
-      }
+Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> tets_of(const ElementMesh<Dim>& mesh) {
+  if (mesh.nodes.rows() == Dim + 1) return mesh.nodes;
+  const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> parts = tets_of_box<Dim>();
+  Eigen::Matrix<int, Dim + 1, Eigen::Dynamic> tets(Dim + 1, parts.cols() * mesh.nodes.cols());
+  for (Eigen::Index e = 0; e < mesh.nodes.cols(); ++e) {
+    for (Eigen::Index p = 0; p < parts.cols(); ++p) {
+      for (int k = 0; k <= Dim; ++k) tets(k, parts.cols() * e + p) = mesh.nodes(parts(k, p), e);
     }
   }
-  body.rest_volume = Eigen::VectorXd::Ones(body.tets.cols());
-  body.rest_volume = jacobians(body, body.rest);  // of unit volumes
-  assert(body.rest_volume.minCoeff() > 0);
+  return tets;
 }
 
 /// The edge between two nodes; `edges` are in lexicographic order.
@@ -63,13 +58,28 @@ int edge_between(const Eigen::Matrix2Xi& edges, int a, int b) {
 }  // namespace
 
 template <int Dim>
+BodyElements<Dim> make_body_elements(const ElementMesh<Dim>& mesh, ElasticLaw law) {
+  return {make_element_block(mesh, law), make_activation_fit(mesh, make_element_constraints(mesh.nodes)), mesh.materials,
+          mesh.fill};
+}
+
+template <int Dim>
+ElementMesh<Dim> mesh_of(const BodyOf<Dim>& body, const BodyElements<Dim>& elements) {
+  return {body.rest, elements.block.nodes, elements.materials, elements.fill};
+}
+
+template <int Dim>
 BodyOf<Dim> make_body(const ElementMesh<Dim>& mesh, const ElementBodyOptions& options) {
+  return make_body<Dim>(mesh, tets_of(mesh), options);
+}
+
+template <int Dim>
+BodyOf<Dim> make_body(const ElementMesh<Dim>& mesh, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>& tets,
+                      const ElementBodyOptions& options) {
   BodyOf<Dim> body;
   body.rest = mesh.rest;
-  BodyElements<Dim> elements;
-  elements.block = make_element_block(mesh, options.law);
+  BodyElements<Dim> elements = make_body_elements(mesh, options.law);
   const ElementConstraints constraints = make_element_constraints(mesh.nodes);
-  elements.fit = make_activation_fit(mesh, constraints);
   body.mass = Eigen::VectorXd::Zero(mesh.rest.cols());
   add_lumped_mass(elements.block, body.mass);
   body.edges = constraints.nodes;
@@ -77,7 +87,10 @@ BodyOf<Dim> make_body(const ElementMesh<Dim>& mesh, const ElementBodyOptions& op
   body.rest_length = springs.rest_length;
   body.edge_stiffness = options.spring_share * springs.stiffness;
   body.edge_damping = options.damping_time * springs.stiffness;
-  fill_with_tets(mesh, elements.block.is_box(), body);
+  body.tets = tets;
+  body.rest_volume = Eigen::VectorXd::Ones(tets.cols());
+  body.rest_volume = jacobians(body, body.rest);  // of unit volumes
+  assert(body.rest_volume.minCoeff() > 0);
   body.tet_edges.resize(kEdgesPerTet<Dim>, body.tets.cols());
   for (Eigen::Index t = 0; t < body.tets.cols(); ++t) {
     for (int a = 0, k = 0; a <= Dim; ++a) {
@@ -88,7 +101,14 @@ BodyOf<Dim> make_body(const ElementMesh<Dim>& mesh, const ElementBodyOptions& op
   return body;
 }
 
-template BodyOf<2> make_body<2>(const ElementMesh<2>&, const ElementBodyOptions&);
-template BodyOf<3> make_body<3>(const ElementMesh<3>&, const ElementBodyOptions&);
+#define HYDROSTAT_INSTANTIATE(Dim)                                                                                 \
+  template BodyElements<Dim> make_body_elements<Dim>(const ElementMesh<Dim>&, ElasticLaw);                         \
+  template ElementMesh<Dim> mesh_of<Dim>(const BodyOf<Dim>&, const BodyElements<Dim>&);                            \
+  template BodyOf<Dim> make_body<Dim>(const ElementMesh<Dim>&, const ElementBodyOptions&);                         \
+  template BodyOf<Dim> make_body<Dim>(const ElementMesh<Dim>&, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>&, \
+                                      const ElementBodyOptions&);
+HYDROSTAT_INSTANTIATE(2)
+HYDROSTAT_INSTANTIATE(3)
+#undef HYDROSTAT_INSTANTIATE
 
 }  // namespace hydrostat::physics

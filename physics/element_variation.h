@@ -48,6 +48,8 @@ class ElementVariation {
 
   const Square& F() const { return F_; }
   const Square& stress() const { return stress_; }
+  /// In the turned frame [N].
+  const Hourglass& hourglass_force() const { return turned_.force; }
 
   /// Of the law alone, without the hourglass part.
   GradientDerivative<Dim> moduli(Definiteness definiteness) const {

@@ -79,6 +79,52 @@ void InternalForces<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, S
   }
 }
 
+template <int Dim>
+Eigen::SparseMatrix<double> InternalForces<Dim>::force_per_activation(const PointsOf<Dim>& x) const {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int e = 0; has_springs_ && e < body_.edge_count(); ++e) {
+    const int low = body_.edges(0, e), high = body_.edges(1, e);
+    const VectorOf<Dim> push = body_.edge_stiffness[e] * body_.rest_length[e] * (x.col(high) - x.col(low)).normalized();
+    for (int i = 0; i < Dim; ++i) {
+      entries.emplace_back(Dim * low + i, e, -push[i]);
+      entries.emplace_back(Dim * high + i, e, push[i]);
+    }
+  }
+  for (const BodyElements<Dim>& elements : body_.elements) {
+    const ElementBlock<Dim>& block = elements.block;
+    for (int k = 0; k < block.element_count(); ++k) {
+      const Eigen::MatrixXd forces = element_force_per_activation<Dim>(block, elements.fit, k, x, activation_);
+      for (int p = 0; p < forces.cols(); ++p) {
+        for (int r = 0; r < forces.rows(); ++r) {
+          entries.emplace_back(Dim * block.nodes(r / Dim, k) + r % Dim, elements.fit.of_element(p, k), forces(r, p));
+        }
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> result(x.size(), body_.edge_count());
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
+
+template <int Dim>
+Eigen::VectorXd InternalForces<Dim>::tensions(const PointsOf<Dim>& x) const {
+  Eigen::VectorXd result(body_.edge_count());
+  for (int e = 0; e < body_.edge_count(); ++e) {
+    const double length = (x.col(body_.edges(1, e)) - x.col(body_.edges(0, e))).norm();
+    result[e] = body_.edge_stiffness[e] * (length - activation_[e] * body_.rest_length[e]);
+  }
+  for (const BodyElements<Dim>& elements : body_.elements) {
+    for (int k = 0; k < elements.block.element_count(); ++k) {
+      const Eigen::RowVectorXd energy = element_energy_per_activation<Dim>(elements.block, elements.fit, k, x, activation_);
+      for (int p = 0; p < energy.size(); ++p) {
+        const int e = elements.fit.of_element(p, k);
+        result[e] -= energy[p] / body_.rest_length[e];
+      }
+    }
+  }
+  return result;
+}
+
 /// Largest of the tets' own frequencies squared [1/s2] by their volume springs: these stiffen with the square of the area of
 /// their faces.
 template <int Dim>

@@ -24,6 +24,12 @@ class InternalForces {
   void add_forces(const StateOf<Dim>& state, PointsOf<Dim>& force) const;
   /// The positive semi-definite part of the elastic Hessian, as SystemMatrixOf::add_stiffness and element_stiffness have it.
   void add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) const;
+  /// Derivative of the elastic forces with respect to the activations [N], Dim N x E. Without elements it does not hang on
+  /// the activations. Allocates.
+  Eigen::SparseMatrix<double> force_per_activation(const PointsOf<Dim>& x) const;
+  /// What pulls the ends of each constraint together [N], E: minus the derivative of the elastic energy with respect to its
+  /// rest length a l0, of a spring k (l - a l0). Allocates.
+  Eigen::VectorXd tensions(const PointsOf<Dim>& x) const;
   bool has_dashpots() const { return has_dashpots_; }
 
   /// By how much the volumes and elements are stiffer at x than at rest [-]: an estimate that errs to the high side, >= 1.

@@ -26,6 +26,7 @@ struct ControlMesh {
   Eigen::VectorXd tet_fill;      // T, share of the tet that the body fills, in (0, 1]
   Eigen::Vector3d origin;        // [m] lowest corner of the lattice; its bottom plane lies on the lowest skin point
   Eigen::Vector3d cell_size;     // [m] of the lattice
+  Eigen::MatrixXi cell_nodes;    // 8 x C, bit d of a row's number is the corner's coordinate d: the body's hexahedra
   Eigen::Matrix3Xi cell_places;  // 3 x C, place of each cell in the lattice; copies have the same place
   Eigen::VectorXi vertex_cells;  // V, the cell that carries each skin vertex
   Eigen::MatrixXd bone_weights;  // B x N, skin weights spread into the volume: >= 0, each column sums to 1

@@ -4,15 +4,66 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "physics/elastic_forces.h"
-
 namespace hydrostat::retarget {
 
-Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double length, double limit, const CorrectorOptions& options)
-    : scene_(scene), muscles_(muscles), options_(options), speed_unit_(std::sqrt(scene.gravity.norm() * length)), limit_(limit), matrix_(scene.body) {
+Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double length, double limit,
+                     const CorrectorOptions& options)
+    : scene_(scene),
+      muscles_(muscles),
+      options_(options),
+      speed_unit_(std::sqrt(scene.gravity.norm() * length)),
+      limit_(limit),
+      matrix_(scene.body),
+      forces_(scene.body) {
   previous_ = Eigen::VectorXd::Zero(muscles.fields.cols());
   // Stiff against the body's own springs, soft enough for the factor: a point gives half a thousandth of L under the weight.
   contact_stiffness_ = scene.body.mass.sum() * scene.gravity.norm() / (5e-4 * length);
+  for (const physics::BodyElements<3>& elements : scene.body.elements) {
+    std::vector<ElementFields>& all = element_fields_.emplace_back();
+    for (const auto pairs : elements.fit.of_element.colwise()) {
+      const Eigen::MatrixXd rows = muscles.fields(pairs, Eigen::all);
+      ElementFields& element = all.emplace_back();
+      for (Eigen::Index k = 0; k < rows.cols(); ++k) {
+        if (!rows.col(k).isZero(0)) element.muscles.push_back(k);
+      }
+      element.fields = rows(Eigen::all, element.muscles);
+    }
+  }
+}
+
+/// Adds th B phi for each muscle to its column of the response.
+void Corrector::add_response_of_springs(const physics::State& state) {
+  const physics::Body& body = scene_.body;
+  for (int e = 0; e < body.edge_count(); ++e) {
+    if (body.edge_stiffness[e] == 0) continue;
+    const int i = body.edges(0, e), j = body.edges(1, e);
+    const Eigen::Vector3d push =
+        options_.horizon_s * body.edge_stiffness[e] * body.rest_length[e] * (state.x.col(j) - state.x.col(i)).normalized();
+    for (Eigen::Index k = 0; k < muscles_.fields.cols(); ++k) {
+      const double field = muscles_.fields(e, k);
+      if (field == 0) continue;
+      response_.col(k).segment<3>(3 * j) += field * push;
+      response_.col(k).segment<3>(3 * i) -= field * push;
+    }
+  }
+}
+
+void Corrector::add_response_of_elements(const physics::State& state) {
+  for (std::size_t b = 0; b < element_fields_.size(); ++b) {
+    const auto& [block, fit, materials, fill] = scene_.body.elements[b];
+    for (int e = 0; e < block.element_count(); ++e) {
+      const ElementFields& element = element_fields_[b][static_cast<std::size_t>(e)];
+      const Eigen::MatrixXd forces = options_.horizon_s *
+                                     physics::element_force_per_activation<3>(block, fit, e, state.x, forces_.activation()) *
+                                     element.fields;
+      for (std::size_t k = 0; k < element.muscles.size(); ++k) {
+        for (int n = 0; n < block.nodes_per_element(); ++n) {
+          response_.col(element.muscles[k]).segment<3>(3 * block.nodes(n, e)) +=
+              forces.col(static_cast<Eigen::Index>(k)).segment<3>(3 * n);
+        }
+      }
+    }
+  }
 }
 
 double Corrector::correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching, double grip,
@@ -23,7 +74,8 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   matrix_.set_zero();
   matrix_.add_mass(body, 1);
   matrix_.add_damping(body, state.x, th);
-  matrix_.add_stiffness(body, state.x, activation, th * th);
+  forces_.set_activation(activation);
+  forces_.add_stiffness(state.x, th * th, matrix_);
   const Eigen::Matrix3d stick_block = th * th * contact_stiffness_ * Eigen::Matrix3d::Identity();
   const Eigen::Matrix3d slide_block = th * th * contact_stiffness_ * scene_.ground.normal * scene_.ground.normal.transpose();
   for (int p = 0; p < scene_.contact_points.count(); ++p) {
@@ -37,20 +89,12 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   const Eigen::Index muscles = muscles_.fields.cols();
   response_.resize(3 * nodes, muscles + 1);
   response_.setZero();
-  for (int e = 0; e < body.edge_count(); ++e) {
-    const int i = body.edges(0, e), j = body.edges(1, e);
-    const Eigen::Vector3d push = th * body.edge_stiffness[e] * body.rest_length[e] * (state.x.col(j) - state.x.col(i)).normalized();
-    for (Eigen::Index k = 0; k < muscles; ++k) {
-      const double field = muscles_.fields(e, k);
-      if (field == 0) continue;
-      response_.col(k).segment<3>(3 * j) += field * push;
-      response_.col(k).segment<3>(3 * i) -= field * push;
-    }
-  }
+  add_response_of_springs(state);
+  add_response_of_elements(state);
   force_.setZero(3, nodes);
   reference_force_.setZero(3, nodes);
-  physics::add_elastic_forces(body, state.x, activation, force_);
-  physics::add_elastic_forces(body, reference.x, activation, reference_force_);
+  forces_.add_elastic_forces(state.x, force_);
+  forces_.add_elastic_forces(reference.x, reference_force_);
   for (int i = 0; i < nodes; ++i) {
     response_.col(muscles).segment<3>(3 * i) =
         body.mass[i] * (state.v.col(i) - reference.v.col(i)) + th * (force_.col(i) - reference_force_.col(i));

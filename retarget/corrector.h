@@ -1,7 +1,7 @@
 #pragma once
 
+#include "physics/internal_forces.h"
 #include "physics/stepper.h"
-#include "physics/system_matrix.h"
 #include "retarget/contacts.h"
 #include "retarget/muscles.h"
 
@@ -34,11 +34,21 @@ class Corrector {
   const Eigen::VectorXd& muscles_now() const { return previous_; }
 
  private:
+  /// What the muscles do to the constraints of one element.
+  struct ElementFields {
+    std::vector<Eigen::Index> muscles;
+    Eigen::MatrixXd fields;  // pairs x muscles
+  };
+  void add_response_of_springs(const physics::State& state);
+  void add_response_of_elements(const physics::State& state);
+
   const physics::Scene& scene_;
   const Muscles& muscles_;
   CorrectorOptions options_;
   double speed_unit_, limit_, contact_stiffness_;
   physics::SystemMatrix matrix_;
+  physics::InternalForces<3> forces_;
+  std::vector<std::vector<ElementFields>> element_fields_;  // of the elements of each block
   Eigen::MatrixXd response_, weighted_, normal_;
   Eigen::VectorXd free_, previous_;
   Eigen::Matrix3Xd force_, reference_force_;

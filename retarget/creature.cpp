@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "physics/element_body.h"
+#include "physics/element_calibration.h"
 #include "retarget/error.h"
 #include "retarget/loop.h"
 
@@ -28,6 +30,31 @@ void scale_character(Character& character, double scale) {
   for (auto& frame : character.clip.bone_pose) {
     for (Eigen::Affine3d& pose : frame) pose = scaled(pose);
   }
+}
+
+physics::Body spring_body(const ControlMesh& mesh, double density, double youngs_modulus, double damping_time) {
+  physics::Material material;
+  material.density = density;
+  material.youngs_modulus = youngs_modulus;
+  material.damping_time = damping_time;
+  return physics::make_body(mesh.nodes, mesh.tets, mesh.edges, mesh.tet_fill, material);
+}
+
+physics::Body element_body(const Creature& creature, const CreatureOptions& options) {
+  const ControlMesh& mesh = creature.mesh;
+  const std::vector<physics::ElementMaterial> materials{{options.density, creature.youngs_modulus, options.poissons_ratio}};
+  const physics::ElementMesh<3> cells{mesh.nodes, mesh.cell_nodes, materials,
+                                      mesh.tet_fill(Eigen::seqN(0, mesh.cells, mesh.tets.cols() / mesh.cells))};
+  const physics::ElementMesh<3> tets{mesh.nodes, mesh.tets, materials, mesh.tet_fill};
+  physics::ElementMesh<3> elements = options.hexahedra ? cells : tets;
+  if (options.calibrated && !options.hexahedra) {
+    elements.materials.front().youngs_modulus *= physics::unlocking_factor<3>(tets, cells);
+  }
+  physics::ElementBodyOptions body_options;
+  body_options.law = options.material == BodyMaterial::kCorotatedLinear ? physics::ElasticLaw::kCorotatedLinear
+                                                                        : physics::ElasticLaw::kStableNeoHookean;
+  body_options.damping_time = options.damping_time * std::sqrt(creature.length);
+  return physics::make_body<3>(elements, mesh.tets, body_options);
 }
 
 /// The skin's vertices with the moves that made the clip a loop with its travel on the ground. `loop` is the clip as
@@ -62,6 +89,15 @@ PrepareOptions prepare_options(const ImportedMotion& imported) {
   return options;
 }
 
+physics::Scene preparation_scene(const Creature& creature) {
+  physics::Scene scene = creature.scene;
+  if (scene.body.elements.empty()) return scene;
+  const physics::ElementMaterial& material = scene.body.elements.front().materials.front();
+  scene.body = spring_body(creature.mesh, material.density, creature.youngs_modulus, 0);
+  scene.body.mass = creature.scene.body.mass;
+  return scene;
+}
+
 std::vector<int> bones_of(const ContactPoints& contacts) { return {contacts.bones.data(), contacts.bones.data() + contacts.bones.size()}; }
 
 Creature make_creature(const Character& character, const CreatureOptions& options) {
@@ -85,12 +121,11 @@ Creature make_creature(const Character& character, const CreatureOptions& option
   creature.skin = embed_skin(creature.mesh, creature.character.skin);
   creature.contacts = contact_points(creature.mesh, creature.character.skeleton, creature.character.skin);
 
-  physics::Material material;
-  material.density = options.density;
   creature.youngs_modulus = options.density * kGravity * creature.length / options.softness;
-  material.youngs_modulus = creature.youngs_modulus;
-  material.damping_time = options.damping_time * std::sqrt(creature.length);
-  creature.scene.body = physics::make_body(creature.mesh.nodes, creature.mesh.tets, creature.mesh.edges, creature.mesh.tet_fill, material);
+  creature.scene.body = options.material == BodyMaterial::kSprings
+                            ? spring_body(creature.mesh, options.density, creature.youngs_modulus,
+                                          options.damping_time * std::sqrt(creature.length))
+                            : element_body(creature, options);
   creature.scene.contact_points = {creature.contacts.embedding.nodes, creature.contacts.embedding.weights};
   creature.scene.ground.friction = options.friction;
   creature.size = std::cbrt(creature.scene.body.mass.sum() / options.density);

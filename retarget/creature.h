@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "physics/stepper.h"
+#include "retarget/body_material.h"
 #include "retarget/clip.h"
 #include "retarget/control_mesh.h"
 #include "retarget/coupling.h"
@@ -23,6 +24,10 @@ struct CreatureOptions {
   double limit = 0;            // of |activation - 1|; 0: automatic
   double density = 1000;       // [kg/m3]
   double softness = 0.005;     // rho g L / E
+  bool hexahedra = false;      // the lattice's cells are the elements, not the tets they are cut into: not of springs
+  BodyMaterial material = BodyMaterial::kSprings;
+  double poissons_ratio = 0.4;  // of finite elements
+  bool calibrated = false;      // tets of finite elements bend as the cells would that they are cut from (unlocking_factor)
   double damping_time = 0.01;  // [s] at L = 1 m, grows with the square root of L
   double friction = 0.8;
   double rate_hz = 60;
@@ -39,9 +44,13 @@ struct Creature {
   ContactPoints contacts;
   physics::Scene scene;
   double length = 1, size = 1; // L and D [m]
-  double youngs_modulus = 0;   // [Pa]
+  double youngs_modulus = 0;   // [Pa]; what calibrated tets have less is told by the body's elements alone
   std::vector<std::string> warnings;
 };
+
+/// The scene in which a target is prepared: nodes and masses are the creature's own, and springs and volumes of its tets
+/// keep the shape, whatever bears the stress when it is let go.
+physics::Scene preparation_scene(const Creature& creature);
 
 Creature make_creature(const Character& character, const CreatureOptions& options);
 

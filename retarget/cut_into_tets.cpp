@@ -31,10 +31,12 @@ void cut_into_tets(const Lattice& lattice, const BodyCells& cells, ControlMesh& 
     mesh.nodes.col(n) = mesh.origin + mesh.cell_size.cwiseProduct(at(cells.node_places, n).cast<double>());
   mesh.tets.resize(4, 5 * mesh.cells);
   mesh.tet_fill.resize(5 * mesh.cells);
+  mesh.cell_nodes.resize(8, mesh.cells);
   mesh.cell_places.resize(3, mesh.cells);
   std::set<std::pair<int, int>> edges;
   std::set<int> places;
   for (int c = 0; c < mesh.cells; ++c) {
+    for (int k = 0; k < 8; ++k) mesh.cell_nodes(k, c) = at(at(cells.nodes, c), k);
     mesh.cell_places.col(c) = grid.place(at(cells.place, c));
     mesh.copied_cells += !places.insert(at(cells.place, c)).second;
     for (int t = 0; t < 5; ++t) {

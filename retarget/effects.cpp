@@ -55,8 +55,10 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, body.node_count());
   const physics::Body springs = without_volume(body);
   const auto ms = [](double seconds_per_second) { return 1e3 * seconds_per_second; };
-  const double elastic = seconds_of([&] { physics::add_elastic_forces(body, state.x, passive, force); });
-  const double edges_alone = seconds_of([&] { physics::add_elastic_forces(springs, state.x, passive, force); });
+  const bool has_elements = !body.elements.empty();  // volume is then a part of their law
+  const double elastic = has_elements ? 0 : seconds_of([&] { physics::add_elastic_forces(body, state.x, passive, force); });
+  const double edges_alone =
+      has_elements ? 0 : seconds_of([&] { physics::add_elastic_forces(springs, state.x, passive, force); });
   const double damping = seconds_of([&] { physics::add_damping_forces(body, state.x, state.v, force); });
   const double gravity = seconds_of([&] { force.colwise() += performer.scene.gravity; });
   const double embedding = seconds_of([&] { embedded_positions(performer.embedding, state.x); });
@@ -65,13 +67,18 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
 
   return {
       {"gravity", "on", "9.81 m/s2 downward; timed as a pass over the nodes of its own", ms(gravity * passes)},
-      {"ground", "on", "the target stands and lands on it; friction is solved in the same pass and its cost is in this figure",
+      {"ground", "on",
+       "the target stands and lands on it; friction is solved in the same pass and its cost is in this figure",
        ms(ground_seconds(performer.scene, state, options))},
       {"friction", "on", "feet hold by it; its cost cannot be told from the ground's and is counted there", 0},
       {"obstacles", "off", "there is nothing but the ground", 0},
       {"self_contact", "off", "not simulated in this version: parts of the body pass through each other", 0},
-      {"volume", "on", "the body keeps the volume of each tet by a spring", ms(std::max(0.0, elastic - edges_alone) * passes)},
-      {"damping", "on", "a dashpot along every constraint; timed as a pass over the constraints of its own", ms(damping * passes)},
+      {"volume", "on",
+       has_elements ? "a part of the elements' law, as far as Poisson's ratio says; counted there"
+                    : "the body keeps the volume of each tet by a spring",
+       ms(std::max(0.0, elastic - edges_alone) * passes)},
+      {"damping", "on", "a dashpot along every constraint; timed as a pass over the constraints of its own",
+       ms(damping * passes)},
       {"air_drag", "off", "not simulated in this version: the creature moves in still air without drag", 0},
       {"water", "off", "there is no water", 0},
       {"pushes", pushed ? "on" : "off", pushed ? "asked for by --push" : "none was asked for", ms(pushing * passes)},

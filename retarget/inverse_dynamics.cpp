@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "physics/elastic_forces.h"
-#include "physics/system_matrix.h"
+#include "physics/internal_forces.h"
 #include "retarget/balance.h"
 #include "retarget/least_squares.h"
 
@@ -14,6 +14,9 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kTie = 10;  // weight of the rows that tie y to the residual force: they give way by 1 % of the metric of a rigid mode, less elsewhere
+constexpr int kFirstRounds = 6,
+              kLaterRounds = 1;         // of linearising the forces of elements, in the first sweep and in those after it
+constexpr double kSettled = 0.01;       // change of an activation that ends the rounds
 constexpr double kForceWeight = 0.1;    // per contact force in m g, in mm per m of L: makes the split of loads unique
 
 /// Everything about one frame that does not change from sweep to sweep.
@@ -42,47 +45,48 @@ Eigen::VectorXd kinematic_activation(const physics::Body& body, const physics::C
   return u;
 }
 
-/// rho [N], 3 x N: what contact and activation must provide.
-Eigen::Matrix3Xd wanted_force(const Dynamics& dynamics, Eigen::Index f) {
+/// rho [N], 3 x N: what contact and a change of the activations that `forces` holds must provide.
+Eigen::Matrix3Xd wanted_force(const Dynamics& dynamics, const physics::InternalForces<3>& forces, Eigen::Index f) {
   const physics::Body& body = dynamics.scene.body;
   const Eigen::Matrix3Xd x = dynamics.prepared.target.at(f);
   const Eigen::Map<const Eigen::Matrix3Xd> v(dynamics.velocity.data() + f * dynamics.velocity.rows(), 3, x.cols());
   const Eigen::Map<const Eigen::Matrix3Xd> a(dynamics.acceleration.data() + f * dynamics.acceleration.rows(), 3, x.cols());
-  Eigen::Matrix3Xd passive = Eigen::Matrix3Xd::Zero(3, x.cols());
-  physics::add_elastic_forces(body, x, Eigen::VectorXd::Ones(body.edge_count()), passive);
-  physics::add_damping_forces(body, x, v, passive);
+  Eigen::Matrix3Xd internal = Eigen::Matrix3Xd::Zero(3, x.cols());
+  forces.add_elastic_forces(x, internal);
+  physics::add_damping_forces(body, x, v, internal);
   Eigen::Matrix3Xd rho(3, x.cols());
-  for (int i = 0; i < body.node_count(); ++i) rho.col(i) = body.mass[i] * (a.col(i) - dynamics.scene.gravity) - passive.col(i);
+  for (int i = 0; i < body.node_count(); ++i)
+    rho.col(i) = body.mass[i] * (a.col(i) - dynamics.scene.gravity) - internal.col(i);
   return rho;
 }
 
-/// The force of a unit of u on the higher node of edge e; the lower one feels the opposite.
-Eigen::Vector3d edge_push(const physics::Body& body, const physics::ConstPoints& x, int e) {
-  return body.edge_stiffness[e] * body.rest_length[e] * (x.col(body.edges(1, e)) - x.col(body.edges(0, e))).normalized();
-}
-
-Eigen::SparseMatrix<double> compliance_matrix(const Dynamics& dynamics, const Eigen::Matrix3Xd& x, const Eigen::VectorXd& u, double ts,
-                                              physics::SystemMatrix& matrix) {
+/// A at the activations that `forces` holds.
+void assemble_compliance(const Dynamics& dynamics, const physics::InternalForces<3>& forces, const Eigen::Matrix3Xd& x,
+                         double ts, physics::SystemMatrix& matrix) {
   const physics::Body& body = dynamics.scene.body;
   matrix.set_zero();
   matrix.add_mass(body, 1);
   matrix.add_damping(body, x, ts);
-  matrix.add_stiffness(body, x, Eigen::VectorXd(u.array() + 1), ts * ts);
-  return Eigen::SparseMatrix<double>(matrix.lower().selfadjointView<Eigen::Lower>());
+  forces.add_stiffness(x, ts * ts, matrix);
 }
 
-Frame make_frame(const Dynamics& dynamics, Eigen::Index f, const InverseOptions& options) {
+/// The frame's problem with the forces linear in the activations about `at` (u, E); the metric A is that of the kinematic
+/// ones.
+void linearise(const Dynamics& dynamics, Eigen::Index f, const Eigen::VectorXd& at, Frame& frame) {
   const physics::Body& body = dynamics.scene.body;
   const physics::ContactPoints& points = dynamics.scene.contact_points;
   const Eigen::Matrix3Xd x = dynamics.prepared.target.at(f);
   const double ts = 1 / dynamics.prepared.target.rate_hz, mass = body.mass.sum();
   const int nodes = body.node_count(), edges = body.edge_count();
-  Frame frame;
-  frame.generators = contact_generators(dynamics.prepared.contacts, f, dynamics.scene.ground.friction, options.support_friction);
-  frame.kinematic = kinematic_activation(body, x, options.limit);
+  physics::InternalForces<3> internal(body);
+  internal.set_activation(frame.kinematic.array() + 1);
   physics::SystemMatrix matrix(body);
-  const Eigen::SparseMatrix<double> a = compliance_matrix(dynamics, x, frame.kinematic, ts, matrix);
-  const Eigen::Matrix3Xd rho = wanted_force(dynamics, f);
+  assemble_compliance(dynamics, internal, x, ts, matrix);
+  const Eigen::SparseMatrix<double> a = matrix.lower().selfadjointView<Eigen::Lower>();
+  internal.set_activation(at.array() + 1);
+  Eigen::Matrix3Xd rho = wanted_force(dynamics, internal, f);
+  const Eigen::SparseMatrix<double> b = internal.force_per_activation(x);
+  rho += (b * at).reshaped(3, nodes);
 
   const int forces = static_cast<int>(frame.generators.size()), columns = 3 * nodes + edges + forces;
   const int rows = 3 * nodes + 3 * nodes + edges + forces;
@@ -97,14 +101,14 @@ Frame make_frame(const Dynamics& dynamics, Eigen::Index f, const InverseOptions&
       entries.emplace_back(it.row(), c, row_scale[it.row() / 3] * it.value() * dynamics.unit);
     }
   }
+  for (int e = 0; e < edges; ++e) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(b, e); it; ++it) {
+      entries.emplace_back(it.row(), 3 * nodes + e, row_scale[it.row() / 3] * ts * ts * it.value());
+    }
+  }
   const auto add_force = [&](int node, const Eigen::Vector3d& force, int column) {
     for (int r = 0; r < 3; ++r) entries.emplace_back(3 * node + r, column, row_scale[node] * ts * ts * force[r]);
   };
-  for (int e = 0; e < edges; ++e) {
-    const Eigen::Vector3d push = edge_push(body, x, e);
-    add_force(body.edges(1, e), push, 3 * nodes + e);
-    add_force(body.edges(0, e), -push, 3 * nodes + e);
-  }
   for (int k = 0; k < forces; ++k) {
     const ContactGenerator& g = frame.generators[static_cast<std::size_t>(k)];
     for (int corner = 0; corner < 4; ++corner) {
@@ -120,11 +124,24 @@ Frame make_frame(const Dynamics& dynamics, Eigen::Index f, const InverseOptions&
   for (int k = 0; k < forces; ++k) entries.emplace_back(frame.shape_row + edges + k, 3 * nodes + edges + k, kForceWeight);
   problem.jacobian.resize(rows, columns);
   problem.jacobian.setFromTriplets(entries.begin(), entries.end());
+}
+
+Frame make_frame(const Dynamics& dynamics, Eigen::Index f, const InverseOptions& options) {
+  const physics::Body& body = dynamics.scene.body;
+  const int nodes = body.node_count(), edges = body.edge_count();
+  Frame frame;
+  frame.generators =
+      contact_generators(dynamics.prepared.contacts, f, dynamics.scene.ground.friction, options.support_friction);
+  frame.kinematic = kinematic_activation(body, dynamics.prepared.target.at(f), options.limit);
+  const int forces = static_cast<int>(frame.generators.size()), columns = 3 * nodes + edges + forces;
+  BoundedLeastSquares& problem = frame.problem;
   problem.lower = Eigen::VectorXd::Constant(columns, -std::numeric_limits<double>::infinity());
   problem.upper = Eigen::VectorXd::Constant(columns, std::numeric_limits<double>::infinity());
   problem.lower.segment(3 * nodes, edges).setConstant(-options.limit);
   problem.upper.segment(3 * nodes, edges).setConstant(options.limit);
   problem.lower.tail(forces).setZero();
+  if (!body.elements.empty()) problem.coupled_rows = 3 * nodes;
+  const int rows = 6 * nodes + edges + forces;
   for (int i = 0; i <= nodes; ++i) problem.column_blocks.push_back(3 * i);
   for (int c = 3 * nodes + 1; c <= columns; ++c) problem.column_blocks.push_back(c);
   for (int r = 0; r <= 2 * nodes; ++r) problem.row_blocks.push_back(3 * r);
@@ -147,6 +164,24 @@ void solve_frame(Frame& frame, const Eigen::VectorXd& wish, double weight_per_ed
   const BoundedSolution solution = solve(frame.problem, frame.solution);
   frame.solution = solution.x;
   frame.kkt_residual = solution.kkt_residual;
+}
+
+/// Solves one frame for the wish of its sweep. What springs do is linear in the activations; the forces of elements are
+/// linearised again about every solution (Gauss and Newton).
+void solve_frame(const Dynamics& dynamics, Eigen::Index f, const Eigen::VectorXd& wish, double weight_per_edge,
+                 bool is_first, Frame& frame) {
+  const physics::Body& body = dynamics.scene.body;
+  const Eigen::Index first = 3 * body.node_count(), edges = body.edge_count();
+  if (body.elements.empty()) {
+    if (is_first) linearise(dynamics, f, Eigen::VectorXd::Zero(edges), frame);
+    return solve_frame(frame, wish, weight_per_edge);
+  }
+  for (int round = 0; round < (is_first ? kFirstRounds : kLaterRounds); ++round) {
+    const Eigen::VectorXd before = frame.solution.segment(first, edges);
+    linearise(dynamics, f, before, frame);
+    solve_frame(frame, wish, weight_per_edge);
+    if ((frame.solution.segment(first, edges) - before).cwiseAbs().maxCoeff() < kSettled) break;
+  }
 }
 
 }  // namespace
@@ -180,7 +215,7 @@ InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const phy
       Frame& frame = work[static_cast<std::size_t>(f)];
       if (sweep == 0) {
         frame = make_frame(dynamics, f, options);
-        solve_frame(frame, frame.kinematic, options.shape_weight / static_cast<double>(edges));
+        solve_frame(dynamics, f, frame.kinematic, options.shape_weight / static_cast<double>(edges), true, frame);
         return;
       }
       // The terms with u_t of the three second differences around t, as one square, halfway to their minimum (Jacobi, damped).
@@ -188,7 +223,7 @@ InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const phy
       const Eigen::VectorXd damped = 0.5 * (middle + u_of(f));
       const double smooth = 6 * options.smooth_weight;
       const Eigen::VectorXd wish = (options.shape_weight * frame.kinematic + smooth * damped) / (options.shape_weight + smooth);
-      solve_frame(frame, wish, (options.shape_weight + smooth) / static_cast<double>(edges));
+      solve_frame(dynamics, f, wish, (options.shape_weight + smooth) / static_cast<double>(edges), false, frame);
     };
     std::vector<std::thread> threads;
     const long count = std::max(1, options.threads);
@@ -207,6 +242,7 @@ InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const phy
   result.contact_force = Eigen::MatrixXd::Zero(3 * scene.contact_points.count(), frames);
   result.miss.resize(frames);
   physics::SystemMatrix matrix(body);
+  physics::InternalForces<3> internal(body);
   double root_squared = 0;
   long saturated = 0;
   std::vector<double> strains;
@@ -214,13 +250,12 @@ InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const phy
     const Frame& frame = work[static_cast<std::size_t>(f)];
     const Eigen::Matrix3Xd x = target.at(f);
     const Eigen::VectorXd u = frame.solution.segment(3 * nodes, edges);
-    Eigen::Matrix3Xd residual = wanted_force(dynamics, f);
+    result.activation.col(f) = u.array() + 1;
+    internal.set_activation(result.activation.col(f));
+    Eigen::Matrix3Xd residual = wanted_force(dynamics, internal, f);
+    result.penalty_force.col(f) = internal.tensions(x);
     for (int e = 0; e < edges; ++e) {
-      const Eigen::Vector3d push = u[e] * edge_push(body, x, e);
-      residual.col(body.edges(1, e)) -= push;
-      residual.col(body.edges(0, e)) += push;
       const double now = (x.col(body.edges(1, e)) - x.col(body.edges(0, e))).norm();
-      result.penalty_force(e, f) = body.edge_stiffness[e] * (now - (1 + u[e]) * body.rest_length[e]);
       saturated += std::abs(u[e]) > 0.999 * options.limit ? 1 : 0;
       strains.push_back(std::abs(now / body.rest_length[e] - 1));
     }
@@ -232,10 +267,10 @@ InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const phy
         residual.col(scene.contact_points.nodes(corner, g.point)) -= scene.contact_points.weights(corner, g.point) * force;
       }
     }
-    result.activation.col(f) = u.array() + 1;
     root_squared += residual.rowwise().sum().squaredNorm() / (dynamics.weight * dynamics.weight) / static_cast<double>(frames);
     const double ts = 1 / target.rate_hz;
-    compliance_matrix(dynamics, x, frame.kinematic, ts, matrix);
+    internal.set_activation(frame.kinematic.array() + 1);
+    assemble_compliance(dynamics, internal, x, ts, matrix);
     matrix.factor();
     Eigen::MatrixXd miss = Eigen::Map<Eigen::VectorXd>(residual.data(), residual.size());
     matrix.solve_in_place(miss);

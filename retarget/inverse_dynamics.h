@@ -26,10 +26,11 @@ struct InverseDynamics {
 /// The 99th percentile of the target's constraint strain, at least 0.1, at most 0.4.
 double automatic_limit(const physics::Body& body, const Motion& target);
 
-/// Solves, per frame, min |sqrt(M) Ts^2 A^-1 (rho - B u - J^T Gc alpha)|^2 + eps |u - u_kin|^2 + eps_s |u''|^2 within bounds,
-/// with rho = M (x'' - g) - f_passive(x, v) and A = M + Ts D + Ts^2 K. A^-1 is not formed: the node miss y = Ts^2 A^-1 r is an
-/// unknown of its own, tied to r by heavy rows, so that the problem stays sparse. Source: the design, section 6; the
-/// compliance metric as in Tan, Turk, Liu, "Soft body locomotion", SIGGRAPH 2012, section 5.
+/// Solves, per frame, min |sqrt(M) Ts^2 A^-1 (rho - B u - J^T Gc alpha)|^2 + eps |u - u_kin|^2 + eps_s |u''|^2 within
+/// bounds, with rho = M (x'' - g) - f_passive(x, v) and A = M + Ts D + Ts^2 K. A^-1 is not formed: the node miss y = Ts^2
+/// A^-1 r is an unknown of its own, tied to r by heavy rows, so that the problem stays sparse. Where elements bear the
+/// stress, B and f_passive are linearised again about each solution (Gauss and Newton), A stays as it is at u_kin. Source:
+/// the design, section 6; the compliance metric as in Tan, Turk, Liu, "Soft body locomotion", SIGGRAPH 2012, section 5.
 InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const physics::Scene& scene, double length,
                                        const InverseOptions& options);
 

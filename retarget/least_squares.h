@@ -12,6 +12,9 @@ struct BoundedLeastSquares {
   Eigen::VectorXd lower, upper;           // may be -+ infinity
   std::vector<int> row_blocks;            // first rows of the residual blocks, ending with the number of rows
   std::vector<int> column_blocks;         // first columns of the parameter blocks, ending with the number of columns
+  /// Above 0: the rows from here on have one entry each and every column has at least one of them. The free entries are then
+  /// found through the rows before, which are to be fewer than the columns.
+  int coupled_rows = 0;
 };
 
 struct BoundedSolution {
@@ -22,10 +25,11 @@ struct BoundedSolution {
 };
 
 /// Ceres solves for the free entries while the clamped ones are held; block principal pivoting over them (Portugal,
-/// Judice, Vicente 1994) releases and clamps until the conditions of Karush, Kuhn and Tucker hold. Where that does not settle, a
-/// primal-dual interior-point method (Wright, "Primal-Dual Interior-Point Methods", 1997), its steps solved by Ceres too, comes
-/// near, and pivoting ends from there. A column block of more than one entry must be unbounded. `start` says which entries
-/// begin clamped: those that lie on a bound.
+/// Judice, Vicente 1994) releases and clamps until the conditions of Karush, Kuhn and Tucker hold. Where that does not
+/// settle, a primal-dual interior-point method (Wright, "Primal-Dual Interior-Point Methods", 1997), its steps solved by
+/// Ceres too, comes near, and pivoting ends from there. With coupled_rows, a dense factorisation of the dual system takes
+/// Ceres' place: where many columns meet in a row, their normal equations are nearly full. A column block of more than one
+/// entry must be unbounded. `start` says which entries begin clamped: those that lie on a bound.
 BoundedSolution solve(const BoundedLeastSquares& problem, const Eigen::VectorXd& start, int max_pivots = 40);
 
 }  // namespace hydrostat::retarget

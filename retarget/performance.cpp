@@ -6,6 +6,8 @@
 #include <memory>
 #include <random>
 
+#include "physics/element_body.h"
+
 namespace hydrostat::retarget {
 namespace {
 
@@ -61,6 +63,14 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
   varied.body.edge_stiffness *= variation.stiffness;
   varied.body.volume_stiffness *= variation.stiffness;
   varied.body.edge_damping *= variation.stiffness;
+  for (physics::BodyElements<3>& elements : varied.body.elements) {
+    physics::ElementMesh<3> mesh = physics::mesh_of(varied.body, elements);
+    for (physics::ElementMaterial& material : mesh.materials) {
+      material.density *= variation.mass;
+      material.youngs_modulus *= variation.stiffness;
+    }
+    elements = physics::make_body_elements(mesh, elements.block.law);
+  }
   return varied;
 }
 

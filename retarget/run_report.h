@@ -82,7 +82,7 @@ struct EffectReport {
 };
 
 struct AccuracyReport {
-  std::string method, element;
+  std::string method, element, material;
   double dt_s = 0, estimated_error_length = 0;
 };
 

@@ -52,7 +52,7 @@ const std::map<std::string, std::set<std::string>> kReportGroups{
       "missing_wrench_rms_mg", "missing_wrench_max_mg", "flight_s"}},
     {"inverse", {"miss_rms_length", "root_residual_mg", "kkt_residual", "saturated", "max_strain", "p95_strain", "limit"}},
     {"signals", {"kind", "period_s", "count", "harmonics", "error_rms_l0"}},
-    {"accuracy", {"method", "element", "dt_s", "estimated_error_length"}},
+    {"accuracy", {"method", "element", "material", "dt_s", "estimated_error_length"}},
     {"timing_s", {"total"}}};
 const std::set<std::string> kReplayKeys{
     "cycles",           "duration_s",       "fell",           "fall_time_s",
@@ -299,8 +299,43 @@ TEST(Convert, RefusesBadInputInOneLineAndLeavesNothing) {
   expect(trot + " -o out --limit most", 2, "option --limit: Value most not in range 0.01 to 0.9.");
   expect(trot + " -o out --friction -1", 2, "option --friction: Value -1 not in range 0.05 to 5.");
   expect(trot + " -o out --threads 0", 2, "option --threads: Value 0 not in range 1 to 256.");
+  expect(trot + " -o out --element cube", 2, "option --element: cube not in");
+  expect(trot + " -o out --material jelly", 2, "option --material: jelly not in");
+  expect(trot + " -o out --element hex --material springs", 2,
+         "option --material: springs lie along the edges of tets. Give another");
+  expect(trot + " -o out --calibrated", 2,
+         "option --calibrated: only tets of finite elements are calibrated. Give --material");
   expect(trot + " -o out --method magic", 2, "option --method: magic not in");
   expect(trot + " -o out --root-motion sideways", 2, "option --root-motion: sideways not in");
+}
+
+TEST(Convert, MakesCreaturesOfFiniteElementsThatReplayAsTheyWere) {
+  for (const auto& [options, element, material, corners] :
+       {std::tuple("--element hex", "hex", "stable_neo_hookean", 8),
+        std::tuple("--material corotated_linear", "tet", "corotated_linear", 4)}) {
+    SCOPED_TRACE(options);
+    const TemporaryDirectory directory;
+    convert(directory.path, kSmallClip, "creature", kSmallOptions + std::string(options));
+    const fs::path creature = directory.path / "creature";
+    const json report = report_of(creature), body = json::parse(io::read_file(creature / "body.json"));
+    EXPECT_EQ(report["accuracy"]["element"], element);
+    EXPECT_EQ(report["accuracy"]["material"], material);
+    EXPECT_EQ(report["body"]["elements"], body.at("elements").size());
+    EXPECT_EQ(report["body"]["constraints"], body.at("edges").size());
+    EXPECT_EQ(body.at("elements").at(0).size(), corners);
+    EXPECT_LE(report["inverse"]["root_residual_mg"], 0.02);
+    EXPECT_LE(report["replay"]["closed_loop"]["momentum_residual_mg"], kMomentum);
+    EXPECT_LE(report["replay"]["closed_loop"]["angular_residual_mgl"], kMomentum);
+    const std::string motion = motion_bytes(creature);
+    EXPECT_EQ(hydrostat_in(directory.path, "replay creature --quiet --threads 1").exit_code,
+              report["replay"]["closed_loop"]["fell"] ? 3 : 0);
+    EXPECT_EQ(motion_bytes(creature), motion);
+    // From the cache the body comes as it was made.
+    fs::remove(creature / "report.json");
+    convert(directory.path, kSmallClip, "creature", kSmallOptions + std::string(options) + " --limit 0.5");
+    const json again = report_of(creature);
+    EXPECT_EQ(again["body"], report["body"]);
+  }
 }
 
 TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {

@@ -39,6 +39,45 @@ TEST(BodyFile, GivesTheBodyBackToTheBit) {
   EXPECT_EQ(performer.size, read.size);
 }
 
+TEST(BodyFile, GivesElementsBackToTheBit) {
+  for (const retarget::BoxCreature& creature : retarget::element_box_creatures()) {
+    const retarget::Performer performer = retarget::make_box_performer(3, creature);
+    retarget::Performer read;
+    parse_body(text_of(performer), "body.json", read);
+    const physics::Body &a = performer.scene.body, &b = read.scene.body;
+    EXPECT_EQ(a.edges, b.edges);
+    EXPECT_EQ(a.tet_edges, b.tet_edges);
+    ASSERT_EQ(b.elements.size(), 1U);
+    EXPECT_EQ(a.elements[0].block.nodes, b.elements[0].block.nodes);
+    EXPECT_EQ(a.elements[0].block.law, b.elements[0].block.law);
+    physics::PointsOf<3> force = physics::PointsOf<3>::Zero(3, a.node_count()), same = force;
+    const physics::PointsOf<3> x = Eigen::Vector3d(1.1, 0.95, 1.02).asDiagonal() * a.rest;
+    physics::InternalForces<3>(a).add_elastic_forces(x, force);
+    physics::InternalForces<3>(b).add_elastic_forces(x, same);
+    EXPECT_EQ(force, same);
+  }
+}
+
+TEST(BodyFile, RefusesElementsThatAreNone) {
+  const std::string text = text_of(retarget::make_box_performer(3, retarget::make_element_box_creature(true)));
+  const auto refusal_of = [&](const std::string& from, const std::string& to) {
+    std::string damaged = text;
+    const std::size_t at = damaged.find(from);
+    EXPECT_NE(at, std::string::npos);
+    damaged.replace(at, from.size(), to);
+    retarget::Performer read;
+    try {
+      parse_body(damaged, "body.json", read);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(refusal_of("stable_neo_hookean", "jelly"), "is none that elements have");
+  EXPECT_EQ(refusal_of("\"poissons_ratio\": 0.4", "\"poissons_ratio\": 0.5").find("break a rule: material 0"), 0U);
+  EXPECT_EQ(refusal_of("\"element_fill\": [1.0", "\"element_fill\": [2.0").find("break a rule: element 0"), 0U);
+}
+
 TEST(BodyFile, RefusesATextThatIsCutShort) {
   const std::string text = text_of(retarget::make_box_performer());
   for (const double share : {0.0, 0.3, 0.9, 0.999}) {

@@ -42,6 +42,18 @@ TEST(StageRecords, GiveACharacterBackToTheBit) {
   EXPECT_EQ(packed(record_of(read), "", ""), packed(record_of(imported), "", ""));
 }
 
+TEST(StageRecords, GiveABodyOfElementsBackToTheBit) {
+  for (const retarget::BoxCreature& box : retarget::element_box_creatures()) {
+    retarget::Creature creature;
+    creature.scene = box.scene;
+    const auto read = result_of<retarget::Creature>(record_of(creature));
+    ASSERT_EQ(read.scene.body.elements.size(), 1U);
+    EXPECT_EQ(read.scene.body.elements[0].fit.of_element, box.scene.body.elements[0].fit.of_element);
+    EXPECT_EQ(read.scene.body.elements[0].block.law, box.scene.body.elements[0].block.law);
+    EXPECT_EQ(packed(record_of(read), "", ""), packed(record_of(creature), "", ""));
+  }
+}
+
 TEST(TargetFile, ComesBackWholeOrNotAtAll) {
   PerformedTarget target;
   target.performer = retarget::make_box_performer();

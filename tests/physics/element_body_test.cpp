@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "physics/internal_forces.h"
 #include "tests/physics/element_method_scene.h"
 
 namespace hydrostat::physics {
@@ -36,6 +37,21 @@ TYPED_TEST(ElementBody, IsFilledByItsTetsAndHasEveryPairOfNodesAsAnEdge) {
     touch_with_whole_surface(scene);
     EXPECT_EQ(scene.contact_points.count(), Dim == 2 ? 10 : 34);  // all nodes but those inside
   }
+}
+
+TYPED_TEST(ElementBody, TellsWhatItsElementsWereMadeFrom) {
+  constexpr int Dim = TypeParam::kDim;
+  for_random_element_bodies<Dim>(2, [](const BodyOf<Dim>& body, std::mt19937& random) {
+    const BodyElements<Dim>& elements = body.elements.front();
+    BodyOf<Dim> again = body;
+    again.elements = {make_body_elements(mesh_of(body, elements), elements.block.law)};
+    const PointsOf<Dim> x = body.rest + random_points<Dim>(random, body.node_count(), 0.02);
+    PointsOf<Dim> force = PointsOf<Dim>::Zero(Dim, x.cols()), same = force;
+    InternalForces<Dim>(body).add_elastic_forces(x, force);
+    InternalForces<Dim>(again).add_elastic_forces(x, same);
+    EXPECT_EQ(force, same);
+    EXPECT_EQ(again.elements.front().fit.of_element, elements.fit.of_element);
+  });
 }
 
 // What a stepper does with elements, whatever the method.

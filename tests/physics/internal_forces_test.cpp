@@ -54,6 +54,35 @@ TYPED_TEST(Internal, ForcesHaveNeitherSumNorMomentAndTurnWithTheBody) {
   });
 }
 
+TYPED_TEST(Internal, ActivationsPushAndPullAsForceAndEnergyChangeWithThem) {
+  constexpr int Dim = TypeParam::kDim;
+  const auto expect = [](const BodyOf<Dim>& body, std::mt19937& random) {
+    InternalForces<Dim> forces(body);
+    const Eigen::VectorXd activation = random_activation(random, body, 0.2);
+    const PointsOf<Dim> x = shaken(body, random);
+    ASSERT_TRUE(forces.set_activation(activation));
+    const Eigen::VectorXd push = forces.force_per_activation(x) * Eigen::VectorXd::LinSpaced(body.edge_count(), -1, 1);
+    const Eigen::VectorXd tensions = forces.tensions(x);
+    constexpr double kStep = 1e-6;
+    PointsOf<Dim> ahead = PointsOf<Dim>::Zero(Dim, body.node_count()), behind = ahead;
+    const Eigen::VectorXd change = kStep * Eigen::VectorXd::LinSpaced(body.edge_count(), -1, 1);
+    ASSERT_TRUE(forces.set_activation(activation + change));
+    forces.add_elastic_forces(x, ahead);
+    const double energy_ahead = forces.elastic_energy(x);
+    ASSERT_TRUE(forces.set_activation(activation - change));
+    forces.add_elastic_forces(x, behind);
+    const double slope = (energy_ahead - forces.elastic_energy(x)) / (2 * kStep);
+    EXPECT_LT((push - (ahead - behind).reshaped() / (2 * kStep)).norm(), 1e-6 * push.norm());
+    const double work = -tensions.cwiseProduct(body.rest_length).dot(change) / kStep;
+    EXPECT_NEAR(work, slope, 1e-6 * tensions.cwiseProduct(body.rest_length).norm());
+  };
+  for_random_element_bodies<Dim>(kSeeds, expect);
+  for (unsigned seed = 0; seed < trials(kSeeds); ++seed) {
+    std::mt19937 random(seed);
+    expect(random_body<Dim>(seed), random);
+  }
+}
+
 TYPED_TEST(Internal, StiffnessAtRestIsTheDerivativeOfTheForces) {
   constexpr int Dim = TypeParam::kDim;
   for_random_element_bodies<Dim>(kSeeds, [](const BodyOf<Dim>& body, std::mt19937& random) {

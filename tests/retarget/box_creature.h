@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "physics/element_body.h"
 #include "retarget/clip.h"
 #include "retarget/prepare.h"
 #include "tests/physics/lattice_scene.h"
@@ -57,6 +58,36 @@ inline BoxCreature make_box_creature() {
     creature.patch_bone.push_back(leg_of(place.x(), place.z()));
   }
   return creature;
+}
+
+/// The box of finite elements in the place of springs: its tets, or the cells that they cut.
+inline BoxCreature make_element_box_creature(bool hexahedra,
+                                             physics::ElasticLaw law = physics::ElasticLaw::kStableNeoHookean) {
+  BoxCreature creature = make_box_creature();
+  const physics::Body springs = creature.scene.body;
+  physics::ElementMesh<3> mesh;
+  mesh.rest = springs.rest;
+  mesh.nodes = springs.tets;
+  if (hexahedra) {  // five tets a cell, which lie between its corners
+    mesh.nodes.resize(8, springs.tet_count() / 5);
+    for (int c = 0; c < mesh.nodes.cols(); ++c) {
+      const auto nodes = springs.tets.middleCols<5>(5 * c).reshaped();
+      const Eigen::Vector3d low = springs.rest(Eigen::all, nodes).rowwise().minCoeff();
+      for (const int n : nodes) {
+        const Eigen::Array3i corner = ((springs.rest.col(n) - low).array() > 0.05).cast<int>();
+        mesh.nodes(corner[0] + 2 * corner[1] + 4 * corner[2], c) = n;
+      }
+    }
+  }
+  mesh.materials = {{1000, 1000 * 9.81 * BoxCreature::kLength / 0.005, 0.4}};
+  mesh.fill = Eigen::VectorXd::Ones(mesh.nodes.cols());
+  creature.scene.body = physics::make_body<3>(mesh, springs.tets, physics::ElementBodyOptions{law, 0, 0.01});
+  return creature;
+}
+
+/// Both kinds of elements, each under a law.
+inline std::vector<BoxCreature> element_box_creatures() {
+  return {make_element_box_creature(true), make_element_box_creature(false, physics::ElasticLaw::kCorotatedLinear)};
 }
 
 /// A motion of `frames` frames at 60 Hz: place(x, f) is where the rest place x [m] is in frame f.

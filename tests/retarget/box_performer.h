@@ -7,8 +7,7 @@
 namespace hydrostat::retarget {
 
 /// The box as its replays need it, bobbing on its four soles; its skin is two triangles in the first tets.
-inline Performer make_box_performer(Eigen::Index frames = 12) {
-  const BoxCreature creature = make_box_creature();
+inline Performer make_box_performer(Eigen::Index frames = 12, const BoxCreature& creature = make_box_creature()) {
   const physics::Body& body = creature.scene.body;
   Performer performer;
   performer.scene = creature.scene;

@@ -13,7 +13,9 @@ namespace {
 constexpr double kLimit = 0.3;
 
 struct Controlled {
-  BoxCreature creature = make_box_creature();
+  explicit Controlled(const BoxCreature& box = make_box_creature()) : creature(box) {}
+
+  BoxCreature creature;
   Muscles muscles = make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights);
   physics::State rest{creature.scene.body.rest, Eigen::Matrix3Xd::Zero(3, creature.scene.body.node_count())};
   std::vector<ContactState> standing =
@@ -63,6 +65,21 @@ TEST(Corrector, PushesBackAgainstAnErrorOfVelocity) {
     state.v.colwise() += 0.2 * direction;
     Corrector corrector = controlled.corrector();
     Eigen::VectorXd activation = controlled.passive;
+    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, 1, activation), 0);
+    EXPECT_LT(controlled.gained(state, activation, direction, 1.0 / 30), 0);
+  }
+}
+
+TEST(Corrector, PushesBackThroughElementsToo) {
+  for (const BoxCreature& creature : element_box_creatures()) {
+    const Controlled controlled(creature);
+    physics::State state = controlled.rest;
+    Corrector corrector = controlled.corrector();
+    Eigen::VectorXd activation = controlled.passive;
+    EXPECT_EQ(corrector.correct(state, controlled.rest, controlled.standing, 1, activation), 0);
+    EXPECT_EQ(activation, controlled.passive);
+    const Eigen::Vector3d direction(1, 0, 0);
+    state.v.colwise() += 0.2 * direction;
     EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, 1, activation), 0);
     EXPECT_LT(controlled.gained(state, activation, direction, 1.0 / 30), 0);
   }

@@ -37,6 +37,29 @@ TEST(MakeCreature, KeepsASizeThatIsACreatures) {
   EXPECT_EQ(bones_of(creature.contacts).size(), static_cast<std::size_t>(creature.scene.contact_points.count()));
 }
 
+TEST(MakeCreature, OfElementsHasTheSameNodesAndCells) {
+  const Creature springs = make_creature(block(1, {0, 0, 0}, 6), {});
+  for (const bool hexahedra : {false, true}) {
+    CreatureOptions options;
+    options.material = BodyMaterial::kCorotatedLinear;
+    options.hexahedra = hexahedra;
+    const Creature creature = make_creature(block(1, {0, 0, 0}, 6), options);
+    const physics::Body& body = creature.scene.body;
+    EXPECT_EQ(body.rest, springs.scene.body.rest);
+    EXPECT_EQ(body.tets, springs.scene.body.tets);
+    ASSERT_EQ(body.elements.size(), 1U);
+    EXPECT_EQ(body.elements[0].block.element_count(), hexahedra ? creature.mesh.cells : body.tet_count());
+    EXPECT_NEAR(body.mass.sum(), springs.scene.body.mass.sum(), 1e-9);
+    EXPECT_NEAR(body.elements[0].block.rest_volume.sum(), body.rest_volume.sum(), 1e-12);
+    EXPECT_GT(body.edge_damping.minCoeff(), 0);
+    const physics::Body twin = preparation_scene(creature).body;
+    EXPECT_TRUE(twin.elements.empty());
+    EXPECT_EQ(twin.mass, body.mass);
+    EXPECT_EQ(twin.edge_stiffness, springs.scene.body.edge_stiffness);
+    EXPECT_EQ(twin.volume_stiffness, springs.scene.body.volume_stiffness);
+  }
+}
+
 TEST(MakeCreature, BringsAHouseOrACrumbToOneMetreAndSaysSo) {
   for (const double scale : {141.0, 0.003}) {
     SCOPED_TRACE("scale " + std::to_string(scale));

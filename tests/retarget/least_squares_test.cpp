@@ -106,6 +106,35 @@ TEST(BoundedLeastSquares, AgreesWithDescentAlongCoordinates) {
   }
 }
 
+TEST(BoundedLeastSquares, DualFormFindsTheSameEntries) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    constexpr int kCoupled = 12, kBounded = 30, kFree = 3, kColumns = kBounded + kFree;
+    BoundedLeastSquares problem = random_problem(seed, kBounded, kFree, kCoupled + kColumns, 0.5);
+    // Below the coupled rows one entry a row, some columns with two.
+    std::mt19937 random(seed);
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int r = 0; r < kCoupled; ++r) {
+      for (decltype(problem.jacobian)::InnerIterator it(problem.jacobian, r); it; ++it)
+        entries.emplace_back(r, it.col(), 100 * it.value());
+    }
+    for (int c = 0; c < kColumns; ++c)
+      entries.emplace_back(kCoupled + c, c == 5 ? 4 : c, c == 5 ? 0.3 : 0.1 + static_cast<double>(random() % 3));
+    entries.emplace_back(kCoupled + 4, 4, 0.0);
+    problem.jacobian.resize(kCoupled + kColumns + 1, kColumns);
+    entries.emplace_back(kCoupled + kColumns, 5, 0.7);
+    problem.jacobian.setFromTriplets(entries.begin(), entries.end());
+    problem.target.conservativeResize(kCoupled + kColumns + 1);
+    problem.target[kCoupled + kColumns] = 0.4;
+    problem.row_blocks.back() = kCoupled + kColumns + 1;
+    const BoundedSolution usual = solve(problem, middle_start(problem));
+    problem.coupled_rows = kCoupled;
+    const BoundedSolution dual = solve(problem, middle_start(problem));
+    expect_optimal(problem, dual);
+    EXPECT_LT((dual.x - usual.x).lpNorm<Eigen::Infinity>(), 1e-8);
+  }
+}
+
 TEST(BoundedLeastSquares, NoChoiceOfClampedEntriesIsBetter) {
   for (unsigned seed = 0; seed < 25; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

@@ -83,6 +83,20 @@ TEST(VariedScene, ScalesMassFrictionAndStiffnessAlone) {
   EXPECT_EQ(varied.body.rest_length, scene.body.rest_length);
 }
 
+TEST(VariedScene, ScalesTheForcesOfElementsToo) {
+  for (const BoxCreature& creature : element_box_creatures()) {
+    const physics::Scene varied = varied_scene(creature.scene, {1.01, 1, 1.02}), same = varied_scene(creature.scene, {});
+    const physics::PointsOf<3> x = Eigen::Vector3d(1.1, 0.95, 1.02).asDiagonal() * creature.scene.body.rest;
+    const auto force_of = [&](const physics::Scene& scene) {
+      physics::PointsOf<3> force = physics::PointsOf<3>::Zero(3, x.cols());
+      physics::InternalForces<3>(scene.body).add_elastic_forces(x, force);
+      return force;
+    };
+    EXPECT_TRUE(force_of(varied).isApprox(1.02 * force_of(creature.scene)));
+    EXPECT_EQ(force_of(same), force_of(creature.scene));
+  }
+}
+
 TEST(SubstepError, IsSmallAndShrinksWithTheStep) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);

@@ -58,7 +58,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
  public:
   explicit ExplicitStepper(const SceneOf<Dim>& scene)
       : scene_(scene),
-        forces_(scene.body),
+        forces_(scene.body, scene.threads),
         force_(Dim, scene.body.node_count()),
         inverse_mass_(scene.body.mass.cwiseInverse()),
         contact_(scene),

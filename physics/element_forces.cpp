@@ -22,11 +22,14 @@ struct Sweep {
   using Active = ActiveLayout<Dim, Nodes>;
 
   const ElementBlock<Dim>& block;
+  const int* lane_nodes;  // of the range
   const double* x;
   const ActiveStrain<Dim>* active;
   BatchRange range;
 
-  const int* nodes_of(int batch) const { return &block.lane_nodes[static_cast<std::size_t>(batch) * Nodes * Lanes::kCount]; }
+  const int* nodes_of(int batch) const {
+    return lane_nodes + static_cast<std::size_t>(batch - range.first) * Nodes * Lanes::kCount;
+  }
 
   typename Kernel::Offsets gather(const int* nodes) const {
     typename Kernel::Offsets offset;
@@ -53,21 +56,32 @@ struct Sweep {
     }
   }
 
+  /// Law and activation are settled before the loop: in it they would keep the numbers out of the registers.
   void add_forces(double* force) const {
+    constexpr ElasticLaw kNeoHookean = ElasticLaw::kStableNeoHookean, kCorotated = ElasticLaw::kCorotatedLinear;
+    if (block.law == kNeoHookean) {
+      active ? add_forces_of<kNeoHookean, true>(force) : add_forces_of<kNeoHookean, false>(force);
+    } else {
+      active ? add_forces_of<kCorotated, true>(force) : add_forces_of<kCorotated, false>(force);
+    }
+  }
+
+  template <ElasticLaw kLaw, bool kIsActive>
+  void add_forces_of(double* force) const {
     for (int batch = range.first; batch < range.end; ++batch) {
       const int* const nodes = nodes_of(batch);
       const ElementData<Lanes> data(block.lanes, batch, Layout::kSize);
       typename Kernel::Strain strain = Kernel::strain_of(data, gather(nodes));
       typename Kernel::Square stress;
       typename Kernel::Hourglass hourglass_force;
-      if (active) {
+      if constexpr (kIsActive) {
         const ElementData<Lanes> shape(active->lanes, batch, Active::kSize);
         const typename Kernel::Square inverse = Kernel::active_inverse(shape);
         strain.F = (strain.F * inverse).eval();
-        Kernel::differentiate(block.law, data, Kernel::active_hourglass(shape), strain, stress, hourglass_force);
+        Kernel::differentiate(kLaw, data, Kernel::active_hourglass(shape), strain, stress, hourglass_force);
         stress = (stress * inverse).eval();  // symmetric
       } else {
-        Kernel::differentiate(block.law, data, Kernel::no_hourglass(), strain, stress, hourglass_force);
+        Kernel::differentiate(kLaw, data, Kernel::no_hourglass(), strain, stress, hourglass_force);
       }
       scatter(nodes, Kernel::nodal_forces(data, stress, hourglass_force), force);
     }
@@ -129,20 +143,38 @@ double energy_here(const Sweep<Dim, Nodes>& sweep) {
   return energy(sweep);
 }
 
+template <int Dim>
+const int* lane_nodes_of(const ElementBlock<Dim>& block, BatchRange range) {
+  return block.lane_nodes.data() + static_cast<std::ptrdiff_t>(range.first) * block.nodes_per_element() * Lanes::kCount;
+}
+
+template <int Dim>
+void add_forces_of_nodes(const ElementBlock<Dim>& block, const int* lane_nodes, const ConstNodeMatrix<Dim>& x,
+                         const ActiveStrain<Dim>* active, BatchRange range, NodeMatrix<Dim>& force) {
+  if (block.is_box()) return add_forces_here(Sweep<Dim, 1 << Dim>{block, lane_nodes, x.data(), active, range}, force.data());
+  add_forces_here(Sweep<Dim, Dim + 1>{block, lane_nodes, x.data(), active, range}, force.data());
+}
+
 }  // namespace
 
 template <int Dim>
 double element_energy(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
                       BatchRange range) {
-  if (block.is_box()) return energy_here(Sweep<Dim, 1 << Dim>{block, x.data(), active, range});
-  return energy_here(Sweep<Dim, Dim + 1>{block, x.data(), active, range});
+  const int* const nodes = lane_nodes_of(block, range);
+  if (block.is_box()) return energy_here(Sweep<Dim, 1 << Dim>{block, nodes, x.data(), active, range});
+  return energy_here(Sweep<Dim, Dim + 1>{block, nodes, x.data(), active, range});
 }
 
 template <int Dim>
 void add_element_forces(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
                         BatchRange range, NodeMatrix<Dim>& force) {
-  if (block.is_box()) return add_forces_here(Sweep<Dim, 1 << Dim>{block, x.data(), active, range}, force.data());
-  add_forces_here(Sweep<Dim, Dim + 1>{block, x.data(), active, range}, force.data());
+  add_forces_of_nodes(block, lane_nodes_of(block, range), x, active, range, force);
+}
+
+template <int Dim>
+void add_element_forces(const ElementBlock<Dim>& block, const std::vector<int>& lane_nodes, const ConstNodeMatrix<Dim>& x,
+                        const ActiveStrain<Dim>* active, BatchRange range, NodeMatrix<Dim>& force) {
+  add_forces_of_nodes(block, lane_nodes.data(), x, active, range, force);
 }
 
 template double element_energy<2>(const ElementBlock<2>&, const ConstNodeMatrix<2>&, const ActiveStrain<2>*, BatchRange);
@@ -151,5 +183,9 @@ template void add_element_forces<2>(const ElementBlock<2>&, const ConstNodeMatri
                                     NodeMatrix<2>&);
 template void add_element_forces<3>(const ElementBlock<3>&, const ConstNodeMatrix<3>&, const ActiveStrain<3>*, BatchRange,
                                     NodeMatrix<3>&);
+template void add_element_forces<2>(const ElementBlock<2>&, const std::vector<int>&, const ConstNodeMatrix<2>&,
+                                    const ActiveStrain<2>*, BatchRange, NodeMatrix<2>&);
+template void add_element_forces<3>(const ElementBlock<3>&, const std::vector<int>&, const ConstNodeMatrix<3>&,
+                                    const ActiveStrain<3>*, BatchRange, NodeMatrix<3>&);
 
 }  // namespace hydrostat::physics

@@ -25,5 +25,9 @@ double element_energy(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>
 template <int Dim>
 void add_element_forces(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
                         BatchRange range, NodeMatrix<Dim>& force);
+/// The same on a part of the nodes: `lane_nodes` are the block's of that range, counted as columns of x and `force`.
+template <int Dim>
+void add_element_forces(const ElementBlock<Dim>& block, const std::vector<int>& lane_nodes, const ConstNodeMatrix<Dim>& x,
+                        const ActiveStrain<Dim>* active, BatchRange range, NodeMatrix<Dim>& force);
 
 }  // namespace hydrostat::physics

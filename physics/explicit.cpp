@@ -57,7 +57,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
  public:
   ExplicitStepper(const SceneOf<Dim>& scene, double most_substeps)
       : scene_(scene),
-        forces_(scene.body),
+        forces_(scene.body, scene.threads),
         force_(Dim, scene.body.node_count()),
         inverse_mass_(scene.body.mass.cwiseInverse()),
         contact_(scene),

@@ -46,7 +46,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
  public:
   explicit ImplicitStepper(const SceneOf<Dim>& scene)
       : scene_(scene),
-        forces_(scene.body),
+        forces_(scene.body, scene.threads),
         matrix_(scene.body),
         contact_(scene),
         size_(size_of_volume<Dim>(scene.body.rest_volume.sum())),

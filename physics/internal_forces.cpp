@@ -14,13 +14,17 @@ constexpr double kMostActivation = 100;  // what is longer is a fault of whoever
 }  // namespace
 
 template <int Dim>
-InternalForces<Dim>::InternalForces(const BodyOf<Dim>& body)
+InternalForces<Dim>::InternalForces(const BodyOf<Dim>& body, int threads)
     : body_(body),
       has_springs_(body.elements.empty() || !body.edge_stiffness.isZero(0) || body.volume_stiffness.size() > 0),
       has_dashpots_(body.elements.empty() || !body.edge_damping.isZero(0)),
       activation_(Eigen::VectorXd::Ones(body.edge_count())),
       inverse_mass_(body.mass.cwiseInverse()) {
-  for (const BodyElements<Dim>& elements : body.elements) active_.push_back(make_active_strain(elements.block));
+  for (const BodyElements<Dim>& elements : body.elements) {
+    active_.push_back(make_active_strain(elements.block));
+    parts_.push_back(is_large(elements.block) ? std::make_unique<ElementParts<Dim>>(elements.block) : nullptr);
+    if (parts_.back() != nullptr && team_ == nullptr) team_ = std::make_unique<WorkerTeam>(threads);
+  }
   stiffest_volume_at_rest_ = stiffest_volume(body.rest);
 }
 
@@ -29,6 +33,7 @@ bool InternalForces<Dim>::set_activation(const Eigen::VectorXd& activation) {
   if (!(activation.array().abs() <= kMostActivation).all()) return false;
   if (active_.empty() || activation != activation_) {
     activation_ = activation;
+    is_passive_ = (activation.array() == 1).all();
     for (std::size_t n = 0; n < active_.size(); ++n) {
       if (!physics::set_activation(body_.elements[n].fit, activation, active_[n])) {
         activation_.setConstant(std::nan(""));  // the strains hold nothing: the next call sets them
@@ -40,31 +45,36 @@ bool InternalForces<Dim>::set_activation(const Eigen::VectorXd& activation) {
 }
 
 template <int Dim>
+double InternalForces<Dim>::energy_of_elements(std::size_t n, const PointsOf<Dim>& x) const {
+  const ElementBlock<Dim>& block = body_.elements[n].block;
+  if (parts_[n] != nullptr) return parts_[n]->energy(block, x, active_of(n), *team_);
+  return element_energy<Dim>(block, x, active_of(n), all_batches(block));
+}
+
+template <int Dim>
+void InternalForces<Dim>::add_forces_of_elements(std::size_t n, const PointsOf<Dim>& x, PointsOf<Dim>& force) const {
+  const ElementBlock<Dim>& block = body_.elements[n].block;
+  if (parts_[n] != nullptr) return parts_[n]->add_forces(block, x, active_of(n), *team_, force);
+  add_element_forces<Dim>(block, x, active_of(n), all_batches(block), force);
+}
+
+template <int Dim>
 double InternalForces<Dim>::elastic_energy(const PointsOf<Dim>& x) const {
   double energy = has_springs_ ? physics::elastic_energy(body_, x, activation_) : 0;
-  for (std::size_t n = 0; n < active_.size(); ++n) {
-    const ElementBlock<Dim>& block = body_.elements[n].block;
-    energy += element_energy<Dim>(block, x, &active_[n], all_batches(block));
-  }
+  for (std::size_t n = 0; n < active_.size(); ++n) energy += energy_of_elements(n, x);
   return energy;
 }
 
 template <int Dim>
 void InternalForces<Dim>::add_elastic_forces(const PointsOf<Dim>& x, PointsOf<Dim>& force) const {
   if (has_springs_) physics::add_elastic_forces(body_, x, activation_, force);
-  for (std::size_t n = 0; n < active_.size(); ++n) {
-    const ElementBlock<Dim>& block = body_.elements[n].block;
-    add_element_forces<Dim>(block, x, &active_[n], all_batches(block), force);
-  }
+  for (std::size_t n = 0; n < active_.size(); ++n) add_forces_of_elements(n, x, force);
 }
 
 template <int Dim>
 void InternalForces<Dim>::add_forces(const StateOf<Dim>& state, PointsOf<Dim>& force) const {
   if (has_springs_ || has_dashpots_) add_internal_forces(body_, state, activation_, force);
-  for (std::size_t n = 0; n < active_.size(); ++n) {
-    const ElementBlock<Dim>& block = body_.elements[n].block;
-    add_element_forces<Dim>(block, state.x, &active_[n], all_batches(block), force);
-  }
+  for (std::size_t n = 0; n < active_.size(); ++n) add_forces_of_elements(n, state.x, force);
 }
 
 template <int Dim>
@@ -73,7 +83,7 @@ void InternalForces<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, S
   for (std::size_t n = 0; n < active_.size(); ++n) {
     const ElementBlock<Dim>& block = body_.elements[n].block;
     for (int e = 0; e < block.element_count(); ++e) {
-      const ElementMatrix stiffness = element_stiffness<Dim>(block, e, x, &active_[n], Definiteness::kProjected);
+      const ElementMatrix stiffness = element_stiffness<Dim>(block, e, x, active_of(n), Definiteness::kProjected);
       matrix.add_element(block, e, body_.elements[n].fit.of_element, stiffness, factor);
     }
   }
@@ -146,7 +156,7 @@ double InternalForces<Dim>::stiffening(const PointsOf<Dim>& x) const {
   double growth = 1;
   if (stiffest_volume_at_rest_ > 0) growth = std::max(growth, stiffest_volume(x) / stiffest_volume_at_rest_);
   for (std::size_t n = 0; n < active_.size(); ++n) {
-    growth = std::max(growth, element_stiffening<Dim>(body_.elements[n].block, x, &active_[n]));
+    growth = std::max(growth, element_stiffening<Dim>(body_.elements[n].block, x, active_of(n)));
   }
   return growth;
 }

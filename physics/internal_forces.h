@@ -1,7 +1,9 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "physics/element_parts.h"
 #include "physics/system_matrix.h"
 
 namespace hydrostat::physics {
@@ -11,7 +13,8 @@ namespace hydrostat::physics {
 template <int Dim>
 class InternalForces {
  public:
-  explicit InternalForces(const BodyOf<Dim>& body);
+  /// At most `threads` share the work of a large body; the forces do not hang on how many.
+  explicit InternalForces(const BodyOf<Dim>& body, int threads = 1);
 
   /// Holds the activations [-], E, for what follows; to be called before it. False: one is not finite
   /// or beyond 100, or elements have no shape for them, for one is not above 0.
@@ -36,12 +39,19 @@ class InternalForces {
   double stiffening(const PointsOf<Dim>& x) const;
 
  private:
+  double energy_of_elements(std::size_t n, const PointsOf<Dim>& x) const;
+  void add_forces_of_elements(std::size_t n, const PointsOf<Dim>& x, PointsOf<Dim>& force) const;
   double stiffest_volume(const PointsOf<Dim>& x) const;
+  /// Null while the body is passive: elements then do without.
+  const ActiveStrain<Dim>* active_of(std::size_t block) const { return is_passive_ ? nullptr : &active_[block]; }
 
   const BodyOf<Dim>& body_;
   bool has_springs_, has_dashpots_;  // where there are none, elements bear all
   Eigen::VectorXd activation_, inverse_mass_;
   std::vector<ActiveStrain<Dim>> active_;
+  bool is_passive_ = true;  // all activations are 1
+  std::vector<std::unique_ptr<ElementParts<Dim>>> parts_;  // of the blocks that are large, null for the others
+  std::unique_ptr<WorkerTeam> team_;                       // null where no block is
   double stiffest_volume_at_rest_ = 0;  // [1/s2]
 };
 

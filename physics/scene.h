@@ -19,6 +19,7 @@ struct SceneOf {
   bool has_ground = true;
   std::vector<ObstacleOf<Dim>> obstacles = {};
   VectorOf<Dim> gravity = -9.81 * VectorOf<Dim>::UnitY();  // [m/s2]
+  int threads = 1;  // at most so many share a step of a large body; the outcome does not hang on it
 };
 using Scene = SceneOf<3>;
 

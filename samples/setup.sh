@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what the build (and, with --tests, the tests) needs and this Debian machine lacks, asking for nothing.
+# Installs what the build (and, with --tests, the tests; with --bench, the peer benchmark) needs and this Debian machine lacks,
+# asking for nothing.
 # A run that finds everything in place only asks dpkg.
 set -euo pipefail
 
@@ -13,7 +14,9 @@ command -v node >/dev/null || packages+=(nodejs)
 command -v npm >/dev/null || packages+=(npm)
 if [ "${1:-}" = --tests ]; then
   command -v chromium >/dev/null || packages+=(chromium)
+  packages+=(calculix-ccx)
 fi
+[ "${1:-}" != --bench ] || packages+=(libbenchmark-dev libbullet-dev)
 
 command -v apt-get >/dev/null || {
   echo "setup.sh: apt-get: is not here. Install the counterparts of these Debian packages by hand: ${packages[*]}" >&2

@@ -312,6 +312,19 @@ TYPED_TEST(Steppers, AllocateNothingInTheStepLoopOfElements) {
   EXPECT_EQ(allocations - before, 0);
 }
 
+TEST(Explicit, AllocatesNothingWhereThreadsShareTheStep) {
+  SceneOf<2> scene = in_the_air<2>(make_body(element_bar<2>({60, 45}, {0.6, 0.45}, Cut::kTwoTriangles), {}), false);
+  scene.threads = 2;
+  const std::unique_ptr<StepperOf<2>> stepper = make_stepper(Method::kExplicit, scene);
+  ImpulsesOf<2> impulses = make_impulses(scene);
+  StateOf<2> state{1.01 * scene.body.rest, PointsOf<2>::Zero(2, scene.body.node_count())};
+  stepper->step(kDt, passive(scene.body), nullptr, state, impulses);
+  const Eigen::VectorXd ones = passive(scene.body);
+  const long before = allocations;
+  EXPECT_EQ(stepper->step(kDt, ones, nullptr, state, impulses), Termination::kDone);
+  EXPECT_EQ(allocations - before, 0);
+}
+
 TYPED_TEST(Steppers, SayThatTheyDivergedAndLeaveTheStartState) {
   constexpr int Dim = TypeParam::kDim;
   const BodyOf<Dim> body = random_body<Dim>(2);

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# The benchmarks of physics, on one thread, in processor time:
+#   tests/bench/run.sh [peers] [-o DIR] [--sizes 1|2|3] [options of Google Benchmark]
+# our methods and Bullet's deformable body on the same meshes; exit code 1 if a goal is missed. All three sizes take ten minutes.
+#   tests/bench/run.sh damping [-o DIR]
+# explicit and implicit over damping and stiffness.
+# Installs what is missing, builds, prints a table in markdown and writes it to DIR (default: out/peers/peers.csv,
+# out/damping/damping.csv).
+set -euo pipefail
+project=$(dirname -- "$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")")
+program=peer_bench
+case ${1:-} in
+  peers) shift ;;
+  damping) program=damping_bench && shift ;;
+esac
+"$project/samples/setup.sh" --bench
+cd -- "$project"
+cmake --preset release > /dev/null
+log=build/release/$program.log
+cmake --build --preset release --target "$program" -j "${HYDROSTAT_BUILD_JOBS:-$(nproc)}" > "$log" || {
+  cat "$log" >&2
+  exit 1
+}
+build/release/tests/"$program" "$@"

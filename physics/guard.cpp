@@ -22,6 +22,7 @@ void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum) {
   sum.effect_moment += part.effect_moment;
   sum.gravity_moment += part.gravity_moment;
   sum.hold += part.hold;
+  sum.internal_nodes += part.internal_nodes;
   sum.obstacle_work += part.obstacle_work;
 }
 

@@ -1,0 +1,141 @@
+#include "physics/self_contact.h"
+
+#include <gtest/gtest.h>
+
+#include "physics/nearest_on_face.h"
+#include "tests/physics/method_cases.h"
+
+namespace hydrostat::physics {
+namespace {
+
+constexpr double kDt = 1.0 / 240;  // [s]
+constexpr double kCell = 0.1;      // [m]
+
+//   +---+---+       +---+---+
+//   |   |   |       |   |   |   two blocks of one body, a cell apart
+//   +---+---+       +---+---+
+//   |   |   |       |   |   |
+//   +---+---+       +---+---+
+template <int Dim>
+SceneOf<Dim> two_blocks(bool with_gravity, const Material& material = {1000, 2e5, 4, 0.01}) {
+  const auto keep = [](int i, int, int) { return i != 2; };
+  SceneOf<Dim> scene = in_the_air(body_of(make_lattice<Dim>(5, 2, 2, kCell, keep), material), with_gravity);
+  scene.self_contact.is_on = true;
+  scene.self_contact.friction = 0.5;
+  return scene;
+}
+template <int Dim>
+bool is_second(const SceneOf<Dim>& scene, int node) {
+  return scene.body.rest(0, node) > 2.5 * kCell;
+}
+
+/// The deepest that any place of the surface lies in an element that is no neighbour of its face [m]: looked for everywhere, by
+/// distance to the nearest face that is none.
+template <int Dim>
+double deepest_inside_itself(const BodyOf<Dim>& body, const PointsOf<Dim>& x) {
+  std::vector<std::set<int>> near(static_cast<std::size_t>(body.node_count()));
+  for (int i = 0; i < body.node_count(); ++i) near[static_cast<std::size_t>(i)].insert(i);
+  for (int e = 0; e < body.edge_count(); ++e) {
+    near[static_cast<std::size_t>(body.edges(0, e))].insert(body.edges(1, e));
+    near[static_cast<std::size_t>(body.edges(1, e))].insert(body.edges(0, e));
+  }
+  const auto are_near = [&](const auto& some, const auto& others) {
+    for (const int a : some) {
+      for (const int b : others) {
+        for (const int c : near[static_cast<std::size_t>(a)]) {
+          if (near[static_cast<std::size_t>(c)].count(b) > 0) return true;
+        }
+      }
+    }
+    return false;
+  };
+  constexpr int kParts = 4;
+  double deepest = 0;
+  const std::vector<SurfaceFace> faces = surface_faces(body);
+  for (const SurfaceFace& face : faces) {
+    const Eigen::Matrix<int, Dim, 1> nodes = nodes_of_face(body, face);
+    for (int i = 0; i <= kParts; ++i) {
+      for (int j = 0; j <= (Dim == 3 ? kParts - i : 0); ++j) {
+        const double weights[3] = {1 - static_cast<double>(i + j) / kParts, static_cast<double>(i) / kParts, static_cast<double>(j) / kParts};
+        VectorOf<Dim> place = VectorOf<Dim>::Zero();
+        for (int k = 0; k < Dim; ++k) place += weights[k] * x.col(nodes[k]);
+        for (int t = 0; t < body.tet_count(); ++t) {
+          BlockOf<Dim> spans;
+          for (int k = 0; k < Dim; ++k) spans.col(k) = x.col(body.tets(k + 1, t)) - x.col(body.tets(0, t));
+          const VectorOf<Dim> inside = spans.inverse() * (place - x.col(body.tets(0, t)));
+          if (!(inside.minCoeff() > 0) || !(inside.sum() < 1) || are_near(nodes, body.tets.col(t))) continue;
+          double depth = 1e300;
+          for (const SurfaceFace& other : faces) {
+            const Eigen::Matrix<int, Dim, 1> corners = nodes_of_face(body, other);
+            if (are_near(nodes, corners)) continue;
+            VectorOf<Dim> foot;
+            const BlockOf<Dim> at = corners_of_face<Dim>(x, corners);
+            nearest_on_face<Dim>(place, at, foot);
+            depth = std::min(depth, (place - at * foot).norm());
+          }
+          deepest = std::max(deepest, depth);
+        }
+      }
+    }
+  }
+  return deepest;
+}
+
+/// By how much more the angular momentum changed in a step than gravity and contact with others say [kg m2/s].
+template <int Dim>
+double unexplained_turn(const SceneOf<Dim>& scene, const StateOf<Dim>& before, const StateOf<Dim>& after,
+                        const ImpulsesOf<Dim>& impulses) {
+  const VectorOf<Dim> origin = VectorOf<Dim>::Zero();
+  return (angular_momentum(scene.body, after.x, after.v, origin) - angular_momentum(scene.body, before.x, before.v, origin) -
+          impulses.gravity_moment - impulses.contact_moment)
+      .norm();
+}
+
+template <typename Type>
+class SelfContacts : public testing::Test {};
+using SelfContactCases =
+    std::conditional_t<kSanitized, testing::Types<Case<2, Method::kExplicit>, Case<2, Method::kImplicit>, Case<2, Method::kEuler>>,
+                       testing::Types<Case<2, Method::kExplicit>, Case<2, Method::kImplicit>, Case<2, Method::kEuler>,
+                                      Case<2, Method::kXpbd>, Case<2, Method::kSpring>, Case<3, Method::kExplicit>,
+                                      Case<3, Method::kImplicit>, Case<3, Method::kEuler>>>;
+TYPED_TEST_SUITE(SelfContacts, SelfContactCases, CaseName);
+
+TYPED_TEST(SelfContacts, LetTwoBlocksCollideWithoutAnyOneOutsideKnowing) {
+  constexpr int Dim = TypeParam::kDim;
+  constexpr Method kMethod = TypeParam::kMethod;
+  for (unsigned seed = 0; seed < trials(3u); ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const SceneOf<Dim> scene = two_blocks<Dim>(false);
+    StateOf<Dim> start{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
+    const BlockOf<Dim> turn = random_rotation<Dim>(random);
+    const VectorOf<Dim> middle = vec<Dim>(4 * kCell, kCell, kCell), aside = random_points<Dim>(random, 1, 0.05).col(0);
+    for (int i = 0; i < scene.body.node_count(); ++i) {
+      if (!is_second(scene, i)) continue;
+      start.x.col(i) = middle + vec<Dim>(kCell, 0, 0) + aside + turn * (start.x.col(i) - middle);
+      start.v.col(i) = vec<Dim>(-1.5, 0, 0);
+    }
+    const double mass = scene.body.mass.sum(), energy_at_first = kinetic_energy(scene.body, start.v);
+    double touched = 0, deepest = 0;
+    int steps = 0;
+    const StateOf<Dim> end = simulate(
+        kMethod, scene, start, kDt, 120, [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
+          EXPECT_LT((momentum(scene.body, after.v) - momentum(scene.body, before.v)).norm(), mass * linear_tolerance(kMethod));
+          EXPECT_LT(unexplained_turn(scene, before, after, impulses), mass * angular_tolerance(kMethod));
+          EXPECT_EQ(impulses.contact_nodes.norm(), 0);
+          EXPECT_LT(impulses.internal_nodes.rowwise().sum().norm(), 1e-12 * mass);
+          touched += impulses.internal_nodes.norm();
+          if (++steps % 4 == 0) deepest = std::max(deepest, deepest_inside_itself(scene.body, after.x));
+        });
+    if (kSanitized) continue;  // the rest is of the end
+    EXPECT_GT(touched, 0.5);
+    EXPECT_LT(deepest, 0.02 * size_of(scene.body));
+    EXPECT_LT(kinetic_energy(scene.body, end.v), energy_at_first);
+    VectorOf<Dim> first = VectorOf<Dim>::Zero(), second = first;
+    for (int i = 0; i < scene.body.node_count(); ++i) (is_second(scene, i) ? second : first) += scene.body.mass[i] * end.v.col(i);
+    EXPECT_GT(second.x(), first.x() - 0.05 * mass);  // they part
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::physics

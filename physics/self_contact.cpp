@@ -14,11 +14,14 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kRings = 2;             // of neighbours along the mesh that never touch
 constexpr double kDeepest = 0.5;      // of a tet's altitude [-]: a node deeper behind its face came in elsewhere
 constexpr double kBeside = 0.25;      // of a tet's size [-]: a node farther beside it is not behind its face
-constexpr double kDeepestEdge = 0.25;  // of the shorter of two edges that cross [-]
+// Of the shorter of two edges that cross [-]. Near a corner a pair may begin to cross that has a shorter way out: it is none.
+constexpr double kDeepestEdge = 0.25;
+constexpr double kDeepestNewEdge = 0.02;
 constexpr double kLeastSine = 0.1;     // of the angle between two edges that cross
-constexpr double kLeastOpening = 0.1;  // of their normal against what is outward of both
+constexpr double kBeyond = 0.05;       // of a cosine [-]: how far their normal may be beyond those of the faces beside them
 constexpr double kSame = 1e-9;         // of a distance [-]: faces as near share the edge or corner that is nearest
 constexpr double kNoDirection = 1e-9;  // of a face's size [-]: what is nearer stands off along the face's normal
+constexpr double kSpareReach = 0.2;    // of the shortest edge [-]
 constexpr int kUsualPartners = 24;     // of a place
 
 /// Barycentric coordinates of a point in a tet; false where that is flat or inverted.
@@ -60,7 +63,9 @@ SelfContactSet<Dim>::SelfContactSet(const SceneOf<Dim>& scene) : scene_(scene) {
   partner_begin_.assign(places, 0);
   partner_end_.assign(places, 0);
   partners_.reserve(kUsualPartners * places);
+  spare_reach_ = kSpareReach * scene.body.rest_length.minCoeff();
   overlaps_.resize(points_.size());
+  crossed_.assign(edges_.size(), -1);
 }
 
 /// What is within two edges of a node, and, where the scene says so, what is near it in the rest shape.
@@ -89,7 +94,7 @@ void SelfContactSet<Dim>::find_neighbours() {
       }
     }
   }
-  near_begin_ = {0};
+  near_.assign(count * count, false);
   const double near_at_rest = scene_.self_contact.near_at_rest;
   for (std::size_t n = 0; n < count; ++n) {
     const auto node = static_cast<int>(n);
@@ -102,13 +107,10 @@ void SelfContactSet<Dim>::find_neighbours() {
       std::sort(near.begin(), near.end());
       near.erase(std::unique(near.begin(), near.end()), near.end());
     }
+    for (const int other : near) near_[n * count + static_cast<std::size_t>(other)] = true;
     for (int other = 0; near_at_rest > 0 && other < body.node_count(); ++other) {
-      if ((body.rest.col(other) - body.rest.col(node)).norm() < near_at_rest) near.push_back(other);
+      if ((body.rest.col(other) - body.rest.col(node)).norm() < near_at_rest) near_[n * count + static_cast<std::size_t>(other)] = true;
     }
-    std::sort(near.begin(), near.end());
-    near.erase(std::unique(near.begin(), near.end()), near.end());
-    near_.insert(near_.end(), near.begin(), near.end());
-    near_begin_.push_back(static_cast<int>(near_.size()));
   }
 }
 
@@ -158,9 +160,7 @@ void SelfContactSet<Dim>::find_edges() {
 
 template <int Dim>
 bool SelfContactSet<Dim>::is_near(int a, int b) const {
-  const auto begin = near_.begin() + near_begin_[static_cast<std::size_t>(a)],
-             end = near_.begin() + near_begin_[static_cast<std::size_t>(a) + 1];
-  return std::binary_search(begin, end, b);
+  return near_[static_cast<std::size_t>(a) * piece_.size() + static_cast<std::size_t>(b)];
 }
 
 template <int Dim>
@@ -211,33 +211,42 @@ void SelfContactSet<Dim>::gather_partners(const PointsOf<Dim>& x, int place, dou
 }
 
 template <int Dim>
-void SelfContactSet<Dim>::find(const PointsOf<Dim>& x, double reach, int first_slot, std::vector<ContactOf<Dim>>& candidates) {
+void SelfContactSet<Dim>::gather(const PointsOf<Dim>& x, double reach) {
   for (Eigen::Index f = 0; f < faces_.cols(); ++f) {
     const BlockOf<Dim> corners = corners_of_face<Dim>(x, faces_.col(f));
     face_low_.col(f) = corners.rowwise().minCoeff();
     face_high_.col(f) = corners.rowwise().maxCoeff();
   }
   face_tree_.follow(face_low_, face_high_);
-  tets_follow_ = false;
   partners_.clear();
+  for (int place = 0; place < slot_count_; ++place) gather_partners(x, place, 2 * reach);
+  gathered_at_ = x;
+  gathered_reach_ = reach;
+}
+
+template <int Dim>
+void SelfContactSet<Dim>::find(const PointsOf<Dim>& x, double reach, int first_slot, std::vector<ContactOf<Dim>>& candidates) {
+  double moved = 0;
+  if (gathered_reach_ >= 0) moved = std::sqrt((x - gathered_at_).colwise().squaredNorm().maxCoeff());
+  if (!(moved + reach <= gathered_reach_)) gather(x, reach + spare_reach_);
+  tets_follow_ = false;
   ContactOf<Dim> contact{};
   contact.surface = ContactOf<Dim>::kItself;
   for (int place = 0; place < slot_count_; ++place) {
     const auto p = static_cast<std::size_t>(place);
-    gather_partners(x, place, 2 * reach);
+    const bool is_point = p < points_.size(), has_partners = partner_begin_[p] < partner_end_[p];
+    const bool may_overlap = is_point && (starts_unknown_ || overlaps_[p].face >= 0);
+    if (!has_partners && !may_overlap) continue;
     contact.slot = first_slot + place;
     contact.feature = place;
-    bool is_candidate = partner_begin_[p] < partner_end_[p];
-    if (p < points_.size()) {
-      bool may_overlap = starts_unknown_ || overlaps_[p].face >= 0;
-      if (!may_overlap && is_candidate) {
-        face_node(x, contact);
-        may_overlap = contact.gap < 0;
-      }
-      if (may_overlap) find_overlap(x, place);
-      is_candidate = is_candidate || overlaps_[p].face >= 0;
+    update(x, contact);
+    if (may_overlap || (is_point && contact.gap < 0)) {
+      find_overlap(x, place);
+      update(x, contact);
     }
-    if (is_candidate) candidates.push_back(contact);
+    if (!is_point) crossed_[p - points_.size()] = contact.gap < kInfinity ? contact.points[0] : -1;
+    // What faces nothing now may do so after a turn.
+    if (contact.gap < 2 * reach || contact.gap == kInfinity || !is_point) candidates.push_back(contact);
   }
   starts_unknown_ = false;
 }
@@ -352,16 +361,24 @@ void SelfContactSet<Dim>::face_edge(const PointsOf<Dim>& x, ContactOf<Dim>& cont
   if constexpr (Dim == 3) {
     const auto place = static_cast<std::size_t>(contact.feature);
     const Edge& edge = edges_[place - points_.size()];
+    // The middle of the normals of the faces beside an edge, as long as the cosine between it and them.
     const auto outward = [&](const Edge& of) -> VectorOf<3> {
       VectorOf<3> sum = VectorOf<3>::Zero();
       for (const int f : of.faces) sum += face_normal<3>(corners_of_face<3>(x, faces_.col(f))).normalized();
-      return sum.normalized();
+      return sum / 2;
+    };
+    // Whether what touches the edge along `normal` touches neither face beside it first: all three are perpendicular to the edge.
+    const auto is_between = [](const VectorOf<3>& normal, const VectorOf<3>& out) {
+      const double cosine = out.norm();
+      return normal.dot(out) > (cosine - kBeyond) * cosine;
     };
     const VectorOf<3> a = x.col(edge.nodes[0]), u = x.col(edge.nodes[1]) - a, out = outward(edge);
     const double uu = u.squaredNorm();
+    const int crossed = crossed_[place - points_.size()];
     int tet = -1;
     for (int n = partner_begin_[place]; n < partner_end_[place]; ++n) {
-      const Edge& other = edges_[static_cast<std::size_t>(partners_[static_cast<std::size_t>(n)])];
+      const int partner = partners_[static_cast<std::size_t>(n)];
+      const Edge& other = edges_[static_cast<std::size_t>(partner)];
       const VectorOf<3> c = x.col(other.nodes[0]), v = x.col(other.nodes[1]) - c, w = a - c;
       const double uv = u.dot(v), vv = v.squaredNorm(), uw = u.dot(w), vw = v.dot(w), squared_sine = uu * vv - uv * uv;
       if (!(squared_sine > kLeastSine * kLeastSine * uu * vv)) continue;
@@ -370,9 +387,10 @@ void SelfContactSet<Dim>::face_edge(const PointsOf<Dim>& x, ContactOf<Dim>& cont
       VectorOf<3> normal = u.cross(v) / std::sqrt(squared_sine);
       const VectorOf<3> other_out = outward(other);
       if (normal.dot(other_out - out) < 0) normal = -normal;
-      if (normal.dot(other_out) < kLeastOpening || normal.dot(out) > -kLeastOpening) continue;
+      if (!is_between(normal, other_out) || !is_between(-normal, out)) continue;
       const double gap = normal.dot(w + s * u - t * v);
-      if (gap < -kDeepestEdge * std::sqrt(std::min(uu, vv)) || gap >= contact.gap) continue;
+      const double deepest = partner == crossed ? kDeepestEdge : kDeepestNewEdge;
+      if (gap < -deepest * std::sqrt(std::min(uu, vv)) || gap >= contact.gap) continue;
       contact.gap = gap;
       contact.normal = normal;
       contact.node_count = 2;
@@ -380,6 +398,7 @@ void SelfContactSet<Dim>::face_edge(const PointsOf<Dim>& x, ContactOf<Dim>& cont
       contact.nodes[1] = edge.nodes[1];
       contact.weights[0] = 1 - s;
       contact.weights[1] = s;
+      contact.points[0] = partner;
       tet = owners_[static_cast<std::size_t>(other.faces[0])].tet;
     }
     if (tet >= 0) press_against(x, tet, contact);
@@ -408,6 +427,19 @@ void SelfContactSet<Dim>::carry(const PointsOf<Dim>& x, ContactOf<Dim>& contact)
   for (std::size_t k = 0; k < own + Dim + 1; ++k) {
     contact.inverse_mass += contact.weights[k] * contact.weights[k] * inverse_mass_[contact.nodes[k]];
   }
+}
+
+template <int Dim>
+double SelfContactSet<Dim>::deepest(const PointsOf<Dim>& x) {
+  double deepest = 0;
+  if (is_empty()) return deepest;
+  looked_at_.clear();
+  find(x, kDeepest / 2 * scene_.body.rest_length.minCoeff(), 0, looked_at_);
+  for (ContactOf<Dim>& contact : looked_at_) {
+    update(x, contact);
+    deepest = std::max(deepest, -contact.gap);
+  }
+  return deepest;
 }
 
 template class SelfContactSet<2>;

@@ -25,13 +25,16 @@ class SelfContactSet {
   bool is_empty() const { return slot_count_ == 0; }
   int slot_count() const { return slot_count_; }
   /// Adds to `candidates`, from `first_slot` on, the places that may come to touch while no node moves more than `reach` [m].
-  /// Takes memory only where places have more neighbours than ever before.
+  /// Takes memory only where places have more neighbours than ever before. What is near is gathered somewhat farther out and
+  /// kept until the nodes have moved that far.
   void find(const PointsOf<Dim>& x, double reach, int first_slot, std::vector<ContactOf<Dim>>& candidates);
   /// Brings a candidate to `x`: its gap is infinite where it faces nothing.
   void update(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const;
   /// Weighs the nodes anew, as they stand in `x`.
   void carry(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const;
   void forget() { starts_unknown_ = true; }
+  /// How deep the body is in itself [m], 0 for not at all, as far as nodes and edges tell; to be asked in every step.
+  double deepest(const PointsOf<Dim>& x);
 
  private:
   struct Edge {
@@ -47,6 +50,7 @@ class SelfContactSet {
   bool may_touch(int node, const int* nodes, int count) const;
   bool is_near(int a, int b) const;
   bool may_meet(int a, int b) const;
+  void gather(const PointsOf<Dim>& x, double reach);
   void gather_partners(const PointsOf<Dim>& x, int place, double distance);
   void find_overlap(const PointsOf<Dim>& x, int place);
   void face_node(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const;
@@ -61,12 +65,17 @@ class SelfContactSet {
   std::vector<int> points_;                     // nodes of the surface: the first places
   std::vector<Edge> edges_;                     // the places behind them
   std::vector<int> edge_begin_;                 // faces + 1: of the edges that a face brings
-  std::vector<int> near_begin_, near_;          // of each node: what is too near along the mesh to touch it, in order
+  std::vector<bool> near_;                      // N x N: what is too near along the mesh to touch
   std::vector<int> piece_;                      // of each node: what hangs together has one number
   PointsOf<Dim> face_low_, face_high_, tet_low_, tet_high_;
   BoxTree<Dim> face_tree_, tet_tree_;
   std::vector<int> partner_begin_, partner_end_, partners_;  // of each place: faces, or edges
   std::vector<Overlap> overlaps_;                            // of each point
+  std::vector<int> crossed_;                                 // of each edge: which it crossed at the last find, or -1
+  std::vector<ContactOf<Dim>> looked_at_;                    // by deepest
+  PointsOf<Dim> gathered_at_;                                // where the nodes stood when partners were gathered
+  double gathered_reach_ = -1;                               // [m] as far as nodes may have moved since
+  double spare_reach_ = 0;                                   // [m] beyond what is asked for
   bool starts_unknown_ = true, tets_follow_ = false;
 };
 

@@ -137,5 +137,136 @@ TYPED_TEST(SelfContacts, LetTwoBlocksCollideWithoutAnyOneOutsideKnowing) {
   }
 }
 
+/// The second block laid on the first, which is held, both tilted against gravity.
+template <int Dim>
+StateOf<Dim> piled(SceneOf<Dim>& scene, double degrees, double overlap) {
+  StateOf<Dim> start{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
+  for (int i = 0; i < scene.body.node_count(); ++i) {
+    if (is_second(scene, i)) {
+      start.x.col(i) += vec<Dim>(-3 * kCell, 2 * kCell - overlap, 0);
+    } else {
+      scene.body.held.push_back(i);
+    }
+  }
+  scene.gravity = 9.81 * (tilt<Dim>(degrees) * -VectorOf<Dim>::UnitY());
+  return start;
+}
+
+template <int Dim>
+double speed_of_second(const SceneOf<Dim>& scene, const StateOf<Dim>& state) {
+  double momentum = 0, mass = 0;
+  for (int i = 0; i < scene.body.node_count(); ++i) {
+    if (!is_second(scene, i)) continue;
+    momentum += scene.body.mass[i] * state.v(0, i);
+    mass += scene.body.mass[i];
+  }
+  return momentum / mass;
+}
+
+TYPED_TEST(SelfContacts, HoldABlockOnABlockWithinTheConeAndLetItSlideBeyond) {
+  constexpr int Dim = TypeParam::kDim;
+  if (is_draft(TypeParam::kMethod)) GTEST_SKIP() << "a draft's friction is not to be trusted to a few percent";
+  for (const double friction : {0.5, 0.3}) {
+    SCOPED_TRACE(friction);
+    SceneOf<Dim> scene = two_blocks<Dim>(true, {1000, 2e6, 4, 0.01});
+    scene.self_contact.friction = friction;
+    const StateOf<Dim> start = piled(scene, 20, 0);
+    double speed = 0, held = 0;
+    int steps = 0;
+    const StateOf<Dim> end = simulate(TypeParam::kMethod, scene, start, kDt, 96,
+                                      [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
+                                        if (++steps == 48) speed = speed_of_second(scene, after);
+                                        if (steps > 48) held += impulses.hold.row(1).sum();
+                                      });
+    if (kSanitized) continue;  // the rest is of the end
+    const double faster = speed_of_second(scene, end) - speed, angle = 20 * 3.14159265358979323846 / 180;
+    const double expected = friction > std::tan(angle) ? 0 : 9.81 * (std::sin(angle) - friction * std::cos(angle));
+    EXPECT_NEAR(faster / (48 * kDt), expected, 0.03 * 9.81);
+    EXPECT_NEAR(held / (48 * kDt) / (scene.body.mass.sum() * 9.81 * std::cos(angle)), 1, 0.03);  // it bears both
+    EXPECT_LT(deepest_inside_itself(scene.body, end.x), 0.005 * size_of(scene.body));
+  }
+}
+
+TYPED_TEST(SelfContacts, PushApartWhatOverlapsAtTheStartWithoutThrowingIt) {
+  constexpr int Dim = TypeParam::kDim;
+  for (const double overlap : {0.2 * kCell, 0.8 * kCell}) {
+    SCOPED_TRACE(overlap);
+    SceneOf<Dim> scene = two_blocks<Dim>(true, {1000, 2e6, 4, 0.01});
+    const StateOf<Dim> start = piled(scene, 0, overlap);
+    double fastest = 0;
+    const StateOf<Dim> end = simulate(TypeParam::kMethod, scene, start, kDt, 240,
+                                      [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
+                                        fastest = std::max(fastest, after.v.colwise().norm().maxCoeff());
+                                      });
+    if (kSanitized) continue;  // the rest is of the end
+    EXPECT_LT(deepest_inside_itself(scene.body, end.x), 0.005 * size_of(scene.body));
+    EXPECT_LT(fastest, 4 * push_out_speed(scene));
+    EXPECT_LT(end.v.colwise().norm().maxCoeff(), 0.05);
+    for (int i = 0; i < scene.body.node_count(); ++i) {
+      if (is_second(scene, i)) EXPECT_GT(end.x(1, i), 1.9 * kCell);  // it lies on the other
+    }
+  }
+}
+
+TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
+  constexpr int Dim = TypeParam::kDim;
+  constexpr Method kMethod = TypeParam::kMethod;
+  SceneOf<Dim> scene = in_the_air(bar<Dim>(Dim == 3 ? 16 : 24, 2, 1, kCell, {1000, 2e5, 4, 0.01}), false);
+  scene.self_contact.is_on = true;
+  Eigen::VectorXd curled = passive(scene.body);
+  for (int e = 0; e < scene.body.edge_count(); ++e) {
+    const VectorOf<Dim> span = scene.body.rest.col(scene.body.edges(1, e)) - scene.body.rest.col(scene.body.edges(0, e));
+    const double height = (scene.body.rest(1, scene.body.edges(0, e)) + scene.body.rest(1, scene.body.edges(1, e))) / 2;
+    curled[e] += 0.6 * (height / kCell - 1) * std::pow(span.normalized().x(), 2);
+  }
+  for (const bool on : {true, false}) {
+    SCOPED_TRACE(on ? "on" : "off");
+    scene.self_contact.is_on = on;
+    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(kMethod, scene);
+    ImpulsesOf<Dim> impulses = make_impulses(scene);
+    StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
+    double touched = 0, deepest = 0;
+    const double mass = scene.body.mass.sum();
+    for (int k = 0; k < few_steps(240); ++k) {
+      const StateOf<Dim> before = state;
+      const Eigen::VectorXd activation = passive(scene.body) + std::min(1.0, k / 120.0) * (curled - passive(scene.body));
+      ASSERT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone) << k;
+      EXPECT_LT((momentum(scene.body, state.v) - momentum(scene.body, before.v)).norm(), mass * linear_tolerance(kMethod));
+      if (stepper->guard_steps() == 0) {
+        EXPECT_LT(unexplained_turn(scene, before, state, impulses), mass * angular_tolerance(kMethod));
+      }
+      touched += impulses.internal_nodes.norm();
+      if (k % 16 == 0) deepest = std::max(deepest, deepest_inside_itself(scene.body, state.x));
+    }
+    if (kSanitized) continue;  // the rest is of the end
+    if (on) {
+      EXPECT_GT(touched, 0);
+      EXPECT_LT(deepest, 0.02 * size_of(scene.body));
+    } else {
+      EXPECT_GT(deepest, 0.05 * size_of(scene.body));  // it would go through itself
+    }
+  }
+}
+
+TEST(SelfContactSets, FindNothingInABodyThatIsOnlyStrained) {
+  const auto expect_nothing = []<int Dim>(const SceneOf<Dim>& scene, std::mt19937& random) {
+    for (int n = 0; n < trials(20); ++n) {
+      SCOPED_TRACE(n);
+      BlockOf<Dim> strain = BlockOf<Dim>::Identity() + random_points<Dim>(random, Dim, 0.6);
+      if (n == 0) strain = vec<Dim>(1.5, 0.3, 1.5).asDiagonal();  // between two plates
+      if (!(strain.determinant() > 0.1)) continue;
+      SelfContactSet<Dim> set(scene);
+      EXPECT_EQ(set.deepest(strain * scene.body.rest), 0);
+    }
+  };
+  std::mt19937 random(3);
+  SceneOf<2> flat = scene_of(four_legged<2>(), {});
+  flat.self_contact.is_on = true;
+  expect_nothing(flat, random);
+  SceneOf<3> whole = scene_of(four_legged<3>(), {});
+  whole.self_contact.is_on = true;
+  expect_nothing(whole, random);
+}
+
 }  // namespace
 }  // namespace hydrostat::physics

@@ -21,6 +21,7 @@
 #include "retarget/error.h"
 #include "retarget/flight.h"
 #include "retarget/run_warnings.h"
+#include "retarget/self_contact_plan.h"
 
 namespace hydrostat::cli {
 
@@ -152,6 +153,9 @@ retarget::Performer make_performer(const retarget::Creature& creature, const ret
   performer.clip_rise = retarget::apex_rise(retarget::com_path(motion.nodes, creature.scene.body.mass));
   performer.length = creature.length;
   performer.size = creature.size;
+  retarget::SelfContactPlan plan = retarget::plan_self_contact(performer);
+  performer.scene.self_contact = std::move(plan.settings);
+  performer.self_contact_reason = std::move(plan.reason);
   return performer;
 }
 

@@ -5,6 +5,7 @@
 #include "io/signals_file.h"
 #include "io/write_file.h"
 #include "retarget/error.h"
+#include "retarget/self_contact_plan.h"
 
 namespace hydrostat::io {
 namespace {
@@ -56,6 +57,9 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
   if (!signals_fit_body(loaded.signals, loaded.target.performer.scene.body)) {
     throw Error(signals_file.string(), "'channels'", "are not the constraints of body.json", kMend);
   }
+  retarget::SelfContactPlan plan = retarget::plan_self_contact(loaded.target.performer);
+  loaded.target.performer.scene.self_contact = std::move(plan.settings);
+  loaded.target.performer.self_contact_reason = std::move(plan.reason);
   return loaded;
 }
 

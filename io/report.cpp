@@ -150,6 +150,7 @@ void fill(Group& group, const retarget::SimulationReport& simulation) {
   group.add("volume_error_max", simulation.volume_error_max);
   group.add("volume_error_end", simulation.volume_error_end);
   group.add("penetration_max_size", simulation.penetration_max_size);
+  group.add("self_penetration_max_size", simulation.self_penetration_max_size);
   group.add("inverted_elements", simulation.inverted_elements);
   group.add("inverted_elements_end", simulation.inverted_elements_end);
   group.add("guard_steps", simulation.guard_steps);

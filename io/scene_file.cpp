@@ -7,6 +7,7 @@
 #include "io/scene_shapes.h"
 #include "io/toml_reader.h"
 #include "physics/element_body.h"
+#include "retarget/self_contact_plan.h"
 
 namespace hydrostat::io {
 namespace {
@@ -22,6 +23,7 @@ constexpr double kLeastPoissonsRatio = 0.25; // of springs
 constexpr double kFriction = 0.8;
 const std::string kSprings = "springs";
 const std::vector<std::string> kLaws{kSprings, "stable_neo_hookean", "corotated_linear"};
+const std::vector<std::string> kWishes{"auto", "on", "off"};
 constexpr Within kFrictionRange{.least = 0, .most = 10};
 
 /// Reads the tables of one scene into a scenario.
@@ -39,7 +41,8 @@ class SceneReader {
     refuse_vanishing();
     read_surroundings();
     for (const TomlReader& clamp : root_.tables("clamp")) read_clamp(clamp);
-    place(*body);
+    const StartShape start = place(*body);
+    read_effects(start);
     physics::touch_with_whole_surface(scenario_.scene);
     for (const TomlReader& push : root_.tables("push")) read_push(push);
     body->refuse_others();
@@ -202,7 +205,8 @@ class SceneReader {
     scenario_.scene.obstacles.push_back(std::move(obstacle));
   }
 
-  void place(const TomlReader& body) {
+  /// Returns what the body starts as.
+  StartShape place(const TomlReader& body) {
     physics::SceneOf<Dim>& scene = scenario_.scene;
     physics::StateOf<Dim>& start = scenario_.start;
     const physics::BlockOf<Dim> turn = rotation_of<Dim>(body);
@@ -214,16 +218,32 @@ class SceneReader {
     }
     start.x = scene.body.rest;
     const std::string shape = body.choice_or_first("start", {"rest", "random", "collapsed", "flattened"});
-    retarget::distort<Dim>(shape == "random"      ? StartShape::kRandom
-                           : shape == "collapsed" ? StartShape::kCollapsed
-                           : shape == "flattened" ? StartShape::kFlattened
-                                                  : StartShape::kRest,
-                           scene_.seed, start.x);
+    const StartShape start_shape = shape == "random"      ? StartShape::kRandom
+                                   : shape == "collapsed" ? StartShape::kCollapsed
+                                   : shape == "flattened" ? StartShape::kFlattened
+                                                          : StartShape::kRest;
+    retarget::distort<Dim>(start_shape, scene_.seed, start.x);
     const VectorOf<Dim> velocity = body.numbers_or("velocity_m_s", VectorOf<Dim>::Zero()), centre = physics::centre_of_mass(scene.body, start.x);
     start.v = velocity.replicate(1, start.x.cols());
     for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += spin_velocity(body, start.x.col(i) - centre);
     retarget::hold_at(scenario_.clamps, 0, scene.body.held);
     for (const int node : scene.body.held) start.v.col(node).setZero();
+    return start_shape;
+  }
+
+  void read_effects(StartShape start) {
+    physics::SceneOf<Dim>& scene = scenario_.scene;
+    std::string wish = kWishes.front();
+    double friction = scene.has_ground ? scene.ground.friction : kFriction;
+    if (const std::optional<TomlReader> table = root_.table("effects")) {
+      wish = table->choice_or_first("self_contact", kWishes);
+      friction = table->number_or("self_friction", friction, kFrictionRange);
+      table->refuse_others();
+    }
+    retarget::SelfContactPlan plan = retarget::plan_self_contact<Dim>(
+        scenario_, start, wish == "on" ? retarget::Wish::kOn : wish == "off" ? retarget::Wish::kOff : retarget::Wish::kAuto, friction);
+    scene.self_contact = std::move(plan.settings);
+    scenario_.self_contact_reason = std::move(plan.reason);
   }
 
   static VectorOf<Dim> spin_velocity(const TomlReader& body, const VectorOf<Dim>& arm) {
@@ -276,7 +296,7 @@ SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsig
   const toml::table table = parse_toml(file);
   const TomlReader root(table, file, "");
   for (const char* key : {"dimension", "dt_s", "duration_s", "seed", "method", "gravity_m_s2", "body", "material", "region", "ground",
-                          "obstacle", "clamp", "activation", "push"}) {
+                          "obstacle", "clamp", "activation", "push", "effects"}) {
     root.has(key);
   }
   root.refuse_others();

@@ -1,5 +1,7 @@
 #include "physics/body.h"
 
+#include <algorithm>
+#include <array>
 #include <cassert>
 #include <map>
 #include <utility>
@@ -59,6 +61,38 @@ BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 
   body.edge_stiffness = kEdges * material.youngs_modulus * edge_volume.array() / body.rest_length.array().square();
   body.edge_damping = material.damping_time * body.edge_stiffness;
   return body;
+}
+
+template <int Dim>
+std::vector<SurfaceFace> surface_faces(const BodyOf<Dim>& body) {
+  std::map<std::array<int, Dim>, SurfaceFace> face_of;  // by its nodes in order; tet -1: two tets share it
+  for (int t = 0; t < body.tet_count(); ++t) {
+    for (int opposite = 0; opposite <= Dim; ++opposite) {
+      std::array<int, Dim> key;
+      for (int k = 0, n = 0; k <= Dim; ++k) {
+        if (k != opposite) key[static_cast<std::size_t>(n++)] = body.tets(k, t);
+      }
+      std::sort(key.begin(), key.end());
+      const auto [entry, is_new] = face_of.try_emplace(key, SurfaceFace{t, opposite});
+      if (!is_new) entry->second.tet = -1;
+    }
+  }
+  std::vector<SurfaceFace> faces;
+  for (const auto& [key, face] : face_of) {
+    if (face.tet >= 0) faces.push_back(face);
+  }
+  return faces;
+}
+
+template <int Dim>
+Eigen::Matrix<int, Dim, 1> nodes_of_face(const BodyOf<Dim>& body, const SurfaceFace& face) {
+  // The other nodes of a tet run around the outside as they stand or, if an odd one is missing, the other way.
+  Eigen::Matrix<int, Dim, 1> nodes;
+  for (int k = 0, n = 0; k <= Dim; ++k) {
+    if (k != face.opposite) nodes[n++] = body.tets(k, face.tet);
+  }
+  if (face.opposite % 2 == 1) std::swap(nodes[0], nodes[1]);
+  return nodes;
 }
 
 template <int Dim>
@@ -122,6 +156,8 @@ Eigen::VectorXd jacobians(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x) 
   template BodyOf<Dim> make_body<Dim>(const Eigen::Matrix<double, Dim, Eigen::Dynamic>&,                               \
                                       const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>&, const Eigen::Matrix2Xi&,     \
                                       const Eigen::VectorXd&, const Material&);                                        \
+  template std::vector<SurfaceFace> surface_faces<Dim>(const BodyOf<Dim>&);                                            \
+  template Eigen::Matrix<int, Dim, 1> nodes_of_face<Dim>(const BodyOf<Dim>&, const SurfaceFace&);                      \
   template Eigen::VectorXd inverse_masses<Dim>(const BodyOf<Dim>&);                                                    \
   template VectorOf<Dim> centre_of_mass<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);                           \
   template VectorOf<Dim> momentum<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&);                                 \

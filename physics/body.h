@@ -55,6 +55,17 @@ template <int Dim>
 BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 1, Eigen::Dynamic>& tets,
                       const Eigen::Matrix2Xi& edges, const Eigen::VectorXd& fill, const Material& material);
 
+/// A face of the body's surface: that of a tet across from one of its corners.
+struct SurfaceFace {
+  int tet, opposite;
+};
+/// The faces that only one tet has, in an order that hangs on the numbers of their nodes alone.
+template <int Dim>
+std::vector<SurfaceFace> surface_faces(const BodyOf<Dim>& body);
+/// The nodes of such a face, counter-clockwise seen from outside (2D: with the body on their left).
+template <int Dim>
+Eigen::Matrix<int, Dim, 1> nodes_of_face(const BodyOf<Dim>& body, const SurfaceFace& face);
+
 /// 1 / mass of every node [1/kg], 0 of those that are held; N.
 template <int Dim>
 Eigen::VectorXd inverse_masses(const BodyOf<Dim>& body);

@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 
+#include "physics/nearest_on_face.h"
 #include "physics/obstacle.h"
 
 namespace hydrostat::physics {
@@ -14,44 +15,6 @@ namespace {
 
 constexpr int kFacesOfLeaf = 4;
 constexpr int kDeepestTree = 64;
-
-/// The point of triangle a b c nearest to p by its barycentric weights, and the feature that it lies on: 0 the face, 1 + k
-/// the edge from corner k, 4 + k corner k. Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
-int nearest_on_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                        const Eigen::Vector3d& c, Eigen::Vector3d& weights) {
-  const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d1 <= 0 && d2 <= 0) return weights = {1, 0, 0}, 4;
-  if (d3 >= 0 && d4 <= d3) return weights = {0, 1, 0}, 5;
-  if (d6 >= 0 && d5 <= d6) return weights = {0, 0, 1}, 6;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
-    const double t = d1 / (d1 - d3);
-    return weights = {1 - t, t, 0}, 1;
-  }
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return weights = {0, 1 - t, t}, 2;
-  }
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
-    const double t = d2 / (d2 - d6);
-    return weights = {1 - t, 0, t}, 3;
-  }
-  weights = Eigen::Vector3d(va, vb, vc) / (va + vb + vc);
-  return 0;
-}
-
-template <int Dim>
-VectorOf<Dim> face_normal(const PointsOf<Dim>& vertices, const Eigen::Matrix<int, Dim, 1>& face) {
-  const VectorOf<Dim> along = vertices.col(face[1]) - vertices.col(face[0]);
-  if constexpr (Dim == 3) {
-    return along.cross(vertices.col(face[2]) - vertices.col(face[0]));
-  } else {
-    return {along.y(), -along.x()};
-  }
-}
 
 }  // namespace
 
@@ -71,7 +34,7 @@ void ClosedMeshOf<Dim>::find_normals() {
   face_normals_.resize(Dim, count);
   vertex_normals_ = PointsOf<Dim>::Zero(Dim, vertices_.cols());
   for (int f = 0; f < count; ++f) {
-    face_normals_.col(f) = face_normal<Dim>(vertices_, faces_.col(f)).normalized();
+    face_normals_.col(f) = face_normal<Dim>(corners_of_face<Dim>(vertices_, faces_.col(f))).normalized();
     for (int k = 0; k < Dim; ++k) {
       double angle = 1;
       if constexpr (Dim == 3) {
@@ -142,16 +105,7 @@ int ClosedMeshOf<Dim>::grow_tree(int begin, int end) {
 template <int Dim>
 void ClosedMeshOf<Dim>::consider(int face, const VectorOf<Dim>& point, Nearest& nearest) const {
   VectorOf<Dim> weights;
-  int feature = 0;
-  if constexpr (Dim == 3) {
-    feature = nearest_on_triangle(point, vertices_.col(faces_(0, face)), vertices_.col(faces_(1, face)),
-                                  vertices_.col(faces_(2, face)), weights);
-  } else {
-    const VectorOf<Dim> from = vertices_.col(faces_(0, face)), along = vertices_.col(faces_(1, face)) - from;
-    const double t = (point - from).dot(along) / along.squaredNorm();
-    feature = t <= 0 ? 4 : t >= 1 ? 5 : 0;
-    weights = {1 - std::clamp(t, 0.0, 1.0), std::clamp(t, 0.0, 1.0)};
-  }
+  const int feature = nearest_on_face<Dim>(point, corners_of_face<Dim>(vertices_, faces_.col(face)), weights);
   VectorOf<Dim> foot = VectorOf<Dim>::Zero();
   for (int k = 0; k < Dim; ++k) foot += weights[k] * vertices_.col(faces_(k, face));
   const double squared_distance = (point - foot).squaredNorm();
@@ -204,7 +158,7 @@ std::string broken_mesh_rule(const PointsOf<Dim>& vertices, const Eigen::Matrix<
   // Across every rim of a face lies one other face, which runs along it the other way.
   std::map<std::pair<int, int>, int> balance;
   for (Eigen::Index f = 0; f < faces.cols(); ++f) {
-    if (!(face_normal<Dim>(vertices, faces.col(f)).norm() > 0)) return "face " + std::to_string(f) + " has no area";
+    if (!(face_normal<Dim>(corners_of_face<Dim>(vertices, faces.col(f))).norm() > 0)) return "face " + std::to_string(f) + " has no area";
     for (int k = 0; k < Dim; ++k) {
       const int one = faces(k, f), two = Dim == 3 ? faces((k + 1) % Dim, f) : -1;
       const bool first_of_two = Dim == 3 ? one < two : k == 0;
@@ -219,7 +173,7 @@ std::string broken_mesh_rule(const PointsOf<Dim>& vertices, const Eigen::Matrix<
   }
   double volume = 0;
   for (Eigen::Index f = 0; f < faces.cols(); ++f) {
-    volume += face_normal<Dim>(vertices, faces.col(f)).dot(vertices.col(faces(0, f)) - vertices.col(faces(0, 0)));
+    volume += face_normal<Dim>(corners_of_face<Dim>(vertices, faces.col(f))).dot(vertices.col(faces(0, f)) - vertices.col(faces(0, 0)));
   }
   if (!(volume > 0)) return "its faces look inward";
   return {};

@@ -18,8 +18,10 @@ constexpr double kDeepestCorner = 0.5;  // of the face's size [-]: what is deepe
 }  // namespace
 
 template <int Dim>
-ContactSet<Dim>::ContactSet(const SceneOf<Dim>& scene) : scene_(scene), first_obstacle_(scene.has_ground ? 1 : 0) {
+ContactSet<Dim>::ContactSet(const SceneOf<Dim>& scene)
+    : scene_(scene), first_obstacle_(scene.has_ground ? 1 : 0), itself_(scene) {
   const ContactPointsOf<Dim>& points = scene.contact_points;
+  candidates_.reserve(static_cast<std::size_t>(itself_.slot_count()));
   if (points.count() == 0 || (!scene.has_ground && scene.obstacles.empty())) return;
   inverse_mass_ = inverse_masses(scene.body);
   for (int p = 0; p < points.count(); ++p) features_.push_back({1, {p}});
@@ -49,7 +51,7 @@ ContactSet<Dim>::ContactSet(const SceneOf<Dim>& scene) : scene_(scene), first_ob
                                : corners_of(scene.obstacles[static_cast<std::size_t>(s - first_obstacle_)]));
     slot_count_ += feature_count_.back();
   }
-  candidates_.reserve(static_cast<std::size_t>(slot_count_));
+  candidates_.reserve(static_cast<std::size_t>(slot_count()));
   for (int p = 0; p < points.count(); ++p) {
     ContactOf<Dim> contact{};
     contact.feature = p;
@@ -80,13 +82,14 @@ double ContactSet<Dim>::distance(const PointsOf<Dim>& travel, int surface, const
 
 template <int Dim>
 double ContactSet<Dim>::friction(const ContactOf<Dim>& contact) const {
+  if (contact.is_internal()) return scene_.self_contact.friction;
   if (contact.surface < first_obstacle_) return scene_.ground.friction;
   return scene_.obstacles[static_cast<std::size_t>(contact.surface - first_obstacle_)].friction;
 }
 
 template <int Dim>
 VectorOf<Dim> ContactSet<Dim>::velocity(const ContactOf<Dim>& contact) const {
-  if (contact.surface < first_obstacle_) return VectorOf<Dim>::Zero();
+  if (contact.surface < first_obstacle_) return VectorOf<Dim>::Zero();  // the body itself, too: of() is what moves there
   return scene_.obstacles[static_cast<std::size_t>(contact.surface - first_obstacle_)].velocity;
 }
 
@@ -152,7 +155,7 @@ bool ContactSet<Dim>::is_near(const StateOf<Dim>& state, int surface, const Feat
 }
 
 template <int Dim>
-void ContactSet<Dim>::find(const StateOf<Dim>& state, double reach) {
+void ContactSet<Dim>::find(const StateOf<Dim>& state, double reach, double own_reach) {
   candidates_.clear();
   for (std::size_t s = 0; s < slot_begin_.size(); ++s) {
     for (int f = 0; f < feature_count_[s]; ++f) {
@@ -170,11 +173,14 @@ void ContactSet<Dim>::find(const StateOf<Dim>& state, double reach) {
       candidates_.back().surface = static_cast<int>(s);
     }
   }
+  if (has_internal()) itself_.find(state.x, own_reach, slot_count_, candidates_);
 }
 
 template <int Dim>
 void ContactSet<Dim>::update(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, ContactOf<Dim>& contact) const {
-  if (contact.point_count == 1) {
+  if (contact.is_internal()) {
+    itself_.update(x, contact);
+  } else if (contact.point_count == 1) {
     contact.gap = distance(travel, contact.surface, contact.of(x), contact.normal);
   } else if (contact.point_count == 2) {
     find_deepest_of_edge(x, travel, contact);

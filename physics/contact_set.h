@@ -4,35 +4,9 @@
 #include <array>
 #include <vector>
 
-#include "physics/scene.h"
+#include "physics/self_contact.h"
 
 namespace hydrostat::physics {
-
-/// One place of the body that may touch one surface: the sum over k of weights[k] x(nodes[k]).
-template <int Dim>
-struct ContactOf {
-  static constexpr int kMostNodes = Dim * (Dim + 1);
-  int slot;     // of the pair of place and surface, the same in all steps
-  int surface;  // 0 is the ground where the scene has one, then the obstacles
-  int feature;  // of the body: a contact point, then the edges and then the faces between them
-  int node_count, point_count;
-  std::array<int, kMostNodes> nodes;
-  std::array<double, kMostNodes> weights;
-  std::array<int, Dim> points;     // contact points that share what it bears
-  std::array<double, Dim> shares;  // sum 1
-  double inverse_mass;             // [1/kg] that an impulse meets; 0 where all nodes are held
-  VectorOf<Dim> normal;            // away from the surface
-  double gap;                      // [m], negative inside; infinite where nothing stands opposite
-
-  VectorOf<Dim> of(const PointsOf<Dim>& nodal) const {
-    VectorOf<Dim> sum = nodal.col(nodes[0]) * weights[0];
-    for (int k = 1; k < node_count; ++k) {
-      const auto n = static_cast<std::size_t>(k);
-      sum += nodal.col(nodes[n]) * weights[n];
-    }
-    return sum;
-  }
-};
 
 /// The impulse [N s] that a place moving at `velocity` [m/s] against its surface needs in all, `impulse` being in its velocity
 /// already: none slower than least_velocity along the normal, none along the surface, inside Coulomb's cone.
@@ -53,16 +27,22 @@ VectorOf<Dim> impulse_in_cone(const ContactOf<Dim>& contact, const VectorOf<Dim>
 /// Finds where the body may touch ground and obstacles. Contact points are tested against every surface. What has corners
 /// or is round is also felt between them: along the edges of the contact faces the deepest place is sought, and corners and
 /// balls are held against the faces, so that an obstacle's edge inside one element does not slip through.
-/// Without ground, obstacles or contact points it is empty and costs nothing.
+/// Where the scene asks for it the body is held against itself (SelfContactSet): its candidates stand behind all others.
+/// Without anything to touch, or with it, it is empty and costs nothing.
 template <int Dim>
 class ContactSet {
  public:
   explicit ContactSet(const SceneOf<Dim>& scene);
 
-  bool is_empty() const { return slot_count_ == 0; }
-  int slot_count() const { return slot_count_; }
-  /// Chooses as candidates all that may come to touch while no place moves more than `reach` [m].
-  void find(const StateOf<Dim>& state, double reach);
+  bool is_empty() const { return slot_count() == 0; }
+  bool has_internal() const { return !itself_.is_empty(); }
+  int slot_count() const { return slot_count_ + itself_.slot_count(); }
+  /// Chooses as candidates all that may come to touch while no place moves more than `reach` [m], against the body itself while
+  /// none moves more than `own_reach`.
+  void find(const StateOf<Dim>& state, double reach, double own_reach);
+  void find(const StateOf<Dim>& state, double reach) { find(state, reach, reach); }
+  /// To be called when the state may have nothing to do with that of the last find.
+  void forget() { itself_.forget(); }
   std::vector<ContactOf<Dim>>& candidates() { return candidates_; }
   const std::vector<ContactOf<Dim>>& candidates() const { return candidates_; }
   /// Brings gap and normal of a candidate, and the place of one between the contact points, to `x`.
@@ -70,6 +50,9 @@ class ContactSet {
   /// The gap of a contact whose place on the body stays: `normal` becomes the gradient.
   double gap(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, const ContactOf<Dim>& contact,
              VectorOf<Dim>& normal) const;
+
+  /// Moves the place of a contact of the body with itself to where `x` has it; its normal and gap stay.
+  void carry(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const { itself_.carry(x, contact); }
 
   double friction(const ContactOf<Dim>& contact) const;
   /// Of the surface [m/s].
@@ -99,6 +82,7 @@ class ContactSet {
   std::vector<CornersOf<Dim>> corners_;  // of each surface
   Eigen::VectorXd inverse_mass_;         // [1/kg] of the nodes, 0 of held ones
   std::vector<ContactOf<Dim>> candidates_, point_contacts_;
+  SelfContactSet<Dim> itself_;
 };
 
 }  // namespace hydrostat::physics

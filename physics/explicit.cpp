@@ -69,6 +69,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / (kStepMargin * longest_substep(mode_at_rest_))); }
 
+  void forget() override { contact_.forget(); }
+
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     if (!forces_.set_activation(activation)) return Termination::kDiverged;
@@ -112,6 +114,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
     if (is_between_) state.x -= (0.5 * h) * state.v;
     for (std::size_t n = 0; n < scene_.body.held.size(); ++n) {
       impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.contact_nodes.col(scene_.body.held[n]);
+      if (contact_.has_internal()) impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.internal_nodes.col(scene_.body.held[n]);
     }
     return Termination::kDone;
   }

@@ -301,12 +301,14 @@ class ImplicitStepper final : public StepperOf<Dim> {
     }
     impulses.gravity_moment = dt_ * cross<Dim>(middle_ * body.mass, scene_.gravity);
     for (int i = 0; i < body.node_count(); ++i) {
-      const VectorOf<Dim> impulse = dt_ * force_.col(i) + impulses.contact_nodes.col(i) + impulses.effect_nodes.col(i);
+      VectorOf<Dim> impulse = dt_ * force_.col(i) + impulses.contact_nodes.col(i) + impulses.effect_nodes.col(i);
+      if (contact_.has_internal()) impulse += impulses.internal_nodes.col(i);
       state.v.col(i) = start_.v.col(i) + impulse / body.mass[i] + dt_ * scene_.gravity;
     }
     for (std::size_t n = 0; n < body.held.size(); ++n) {
       const int node = body.held[n];
       impulses.hold.col(static_cast<Eigen::Index>(n)) = impulses.contact_nodes.col(node) - body.mass[node] * state.v.col(node);
+      if (contact_.has_internal()) impulses.hold.col(static_cast<Eigen::Index>(n)) += impulses.internal_nodes.col(node);
       state.v.col(node).setZero();
     }
     if (contact_.is_needed()) {
@@ -315,6 +317,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
     }
     for (std::size_t n = 0; n < body.held.size(); ++n) {
       impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.contact_nodes.col(body.held[n]);
+      if (contact_.has_internal()) impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.internal_nodes.col(body.held[n]);
     }
   }
 

@@ -94,17 +94,19 @@ template <int Dim>
 void ImpulseContact<Dim>::book(const StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
   for (const Active& active : active_) {
     const ContactOf<Dim>& contact = set_.candidates()[static_cast<std::size_t>(active.candidate)];
-    const VectorOf<Dim> impulse = impulse_.col(contact.slot), place = contact.of(state.x);
+    const VectorOf<Dim> impulse = impulse_.col(contact.slot);
+    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + std::max(0.0, active.least_velocity) * contact.normal);
+    PointsOf<Dim>& of_nodes = contact.is_internal() ? impulses.internal_nodes : impulses.contact_nodes;
+    for (int k = 0; k < contact.node_count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      of_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
+    }
+    if (contact.is_internal()) continue;
     for (int k = 0; k < contact.point_count; ++k) {
       const auto n = static_cast<std::size_t>(k);
       impulses.contact.col(contact.points[n]) += contact.shares[n] * impulse;
     }
-    for (int k = 0; k < contact.node_count; ++k) {
-      const auto n = static_cast<std::size_t>(k);
-      impulses.contact_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
-    }
-    impulses.contact_moment += cross<Dim>(place, impulse);
-    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + std::max(0.0, active.least_velocity) * contact.normal);
+    impulses.contact_moment += cross<Dim>(contact.of(state.x), impulse);
   }
 }
 

@@ -13,8 +13,11 @@ class ImpulseContact {
   explicit ImpulseContact(const SceneOf<Dim>& scene);
 
   bool is_needed() const { return !set_.is_empty(); }
+  bool has_internal() const { return set_.has_internal(); }
   /// To be called when the state is not the one that the last substep left behind.
   void forget_reach() { reach_ = 0; }
+  /// To be called when that state may have nothing to do with this one.
+  void forget() { set_.forget(); }
   /// Changes state.v so that state.x may move on by h state.v, books the impulses and moves the obstacles on.
   /// `fastest` [m/s]: no node is faster before contact.
   void push_apart(double h, double fastest, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses);

@@ -8,6 +8,7 @@ namespace hydrostat::physics {
 /// Contact as the minimum of a potential, for implicit methods: a stiff one-sided spring per touching place, and friction a
 /// spring to an anchor that is dragged along when it pulls harder than Coulomb's limit, with a lagged normal force.
 /// What starts inside an obstacle is lifted out at push_out_speed, for its spring's rest place recedes no faster.
+/// Where the body may touch itself, the plane that the surface makes when the step begins is held through the step.
 /// Source: Li et al., "Incremental Potential Contact", SIGGRAPH 2020, sections 4 and 5.4, with springs for the barrier.
 template <int Dim>
 class PenaltyContact {
@@ -15,6 +16,7 @@ class PenaltyContact {
   explicit PenaltyContact(const SceneOf<Dim>& scene);
 
   bool is_needed() const { return !set_.is_empty(); }
+  bool has_internal() const { return set_.has_internal(); }
   /// To be called when the state is not the one that the last step left behind.
   void forget();
   /// Finds what may touch within `reach` [m] of the start and lays the anchors; `foreseen` is about where the step ends.
@@ -45,13 +47,16 @@ class PenaltyContact {
     double lift_work = 0;              // [J] that moving it up in this step stores in the spring
     bool stops = false;                // touches at the end of the step
     double plane_offset = 0;           // of a contact between the points: its surface is held to be a plane
+    double stiffness = 0;              // [N/m] normal and tangential
+    std::array<double, ContactOf<Dim>::kMostNodes> start_weights;  // of a contact with itself that stop_approach has carried on
   };
   double depth(const Touch& touch, const PointsOf<Dim>& x, VectorOf<Dim>& normal) const;
   VectorOf<Dim> slip(const Touch& touch, const PointsOf<Dim>& x) const;
   void lay_anchor(const StateOf<Dim>& start, double dt, Touch& touch) const;
 
   ContactSet<Dim> set_;
-  double stiffness_ = 0;  // [N/m] of a place, normal and tangential
+  double stiffness_ = 0, own_stiffness_ = 0;  // [N/m] of a place, against others and against the body itself
+  double size_ = 0;                           // [m]
   double push_out_speed_ = 0;
   PointsOf<Dim> travel_;  // [m] of the obstacles at the end of the step
   std::vector<Touch> touches_;

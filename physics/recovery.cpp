@@ -38,6 +38,13 @@ VectorOf<Dim> turning(const SpinOf<Dim>& rate, const VectorOf<Dim>& arm) {
   }
 }
 
+template <int Dim>
+SceneOf<Dim> without_self_contact(const SceneOf<Dim>& scene) {
+  SceneOf<Dim> result = scene;
+  result.self_contact.is_on = false;
+  return result;
+}
+
 /// Which piece a node belongs to: pieces hang together by tets. N; `count` becomes their number.
 template <int Dim>
 std::vector<int> pieces_of(const BodyOf<Dim>& body, int& count) {
@@ -69,8 +76,9 @@ class RecoveringStepper<Dim>::Recovery {
  public:
   explicit Recovery(const SceneOf<Dim>& scene)
       : scene_(scene),
+        outside_(without_self_contact(scene)),
         forces_(scene.body),
-        contact_(scene),
+        contact_(outside_),
         arms_(scene.body.rest),
         whole_volume_(scene.body.rest_volume.sum()),
         size_(size_of_volume<Dim>(whole_volume_)) {
@@ -122,6 +130,7 @@ class RecoveringStepper<Dim>::Recovery {
                    ImpulsesOf<Dim>& impulses) {
     if (!forces_.set_activation(activation)) return Termination::kDiverged;  // which the method would not take either
     const BodyOf<Dim>& body = scene_.body;
+    for (std::size_t n = 0; n < outside_.obstacles.size(); ++n) outside_.obstacles[n].velocity = scene_.obstacles[n].velocity;
     since_s_ += dt;
     fit(state);
     clear(impulses);
@@ -208,6 +217,7 @@ class RecoveringStepper<Dim>::Recovery {
   }
 
   const SceneOf<Dim>& scene_;
+  SceneOf<Dim> outside_;  // the body passes through itself
   InternalForces<Dim> forces_;
   ImpulseContact<Dim> contact_;
   std::vector<int> piece_of_;  // N

@@ -1,9 +1,6 @@
 #include "physics/scene.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 
 namespace hydrostat::physics {
 
@@ -14,6 +11,7 @@ ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene) {
   impulses.contact_nodes.resize(Dim, scene.body.node_count());
   impulses.effect_nodes.resize(Dim, scene.body.node_count());
   impulses.hold.resize(Dim, static_cast<Eigen::Index>(scene.body.held.size()));
+  impulses.internal_nodes.resize(Dim, scene.self_contact.is_on ? scene.body.node_count() : 0);
   clear(impulses);
   return impulses;
 }
@@ -27,6 +25,7 @@ void clear(ImpulsesOf<Dim>& impulses) {
   impulses.effect_moment.setZero();
   impulses.gravity_moment.setZero();
   impulses.hold.setZero();
+  impulses.internal_nodes.setZero();
   impulses.obstacle_work = 0;
 }
 
@@ -39,6 +38,7 @@ void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum) {
   sum.effect_moment += part.effect_moment;
   sum.gravity_moment += part.gravity_moment;
   sum.hold += part.hold;
+  sum.internal_nodes += part.internal_nodes;
   sum.obstacle_work += part.obstacle_work;
 }
 
@@ -51,40 +51,24 @@ double push_out_speed(const SceneOf<Dim>& scene) {
 template <int Dim>
 void touch_with_whole_surface(SceneOf<Dim>& scene) {
   const BodyOf<Dim>& body = scene.body;
-  // A face of one tet alone is on the surface; it turns away from the tet's fourth node.
-  std::map<std::array<int, Dim>, std::pair<int, int>> faces;  // by its nodes in order: tet and the node opposite, or -1
-  for (int t = 0; t < body.tet_count(); ++t) {
-    for (int opposite = 0; opposite <= Dim; ++opposite) {
-      std::array<int, Dim> key;
-      for (int k = 0, n = 0; k <= Dim; ++k) {
-        if (k != opposite) key[static_cast<std::size_t>(n++)] = body.tets(k, t);
-      }
-      std::sort(key.begin(), key.end());
-      const auto [entry, is_new] = faces.try_emplace(key, t, opposite);
-      if (!is_new) entry->second = {-1, -1};
-    }
-  }
+  const std::vector<SurfaceFace> faces = surface_faces(body);
   std::vector<int> point_of(static_cast<std::size_t>(body.node_count()), -1);
   ContactPointsOf<Dim>& points = scene.contact_points;
   points.nodes.resize(Dim + 1, body.node_count());
   points.weights.setZero(Dim + 1, body.node_count());
   scene.contact_faces.resize(Dim, static_cast<Eigen::Index>(faces.size()));
   int point_count = 0, face_count = 0;
-  for (const auto& [key, owner] : faces) {
-    const auto [t, opposite] = owner;
-    if (t < 0) continue;
-    // The other nodes of a tet run around the outside as they stand or, if an odd one is missing, the other way.
-    for (int k = 0, n = 0; k <= Dim; ++k) {
-      if (k == opposite) continue;
-      int& point = point_of[static_cast<std::size_t>(body.tets(k, t))];
-      if (point < 0) {
-        point = point_count++;
-        points.nodes.col(point) = body.tets.col(t);
-        points.weights(k, point) = 1;
-      }
-      scene.contact_faces(n++, face_count) = point;
+  for (const SurfaceFace& face : faces) {
+    for (int k = 0; k <= Dim; ++k) {
+      if (k == face.opposite) continue;
+      int& point = point_of[static_cast<std::size_t>(body.tets(k, face.tet))];
+      if (point >= 0) continue;
+      point = point_count++;
+      points.nodes.col(point) = body.tets.col(face.tet);
+      points.weights(k, point) = 1;
     }
-    if (opposite % 2 == 1) std::swap(scene.contact_faces(0, face_count), scene.contact_faces(1, face_count));
+    const Eigen::Matrix<int, Dim, 1> nodes = nodes_of_face(body, face);
+    for (int k = 0; k < Dim; ++k) scene.contact_faces(k, face_count) = point_of[static_cast<std::size_t>(nodes[k])];
     ++face_count;
   }
   points.nodes.conservativeResize(Dim + 1, point_count);

@@ -18,6 +18,7 @@ struct SceneOf {
   GroundOf<Dim> ground;
   bool has_ground = true;
   std::vector<ObstacleOf<Dim>> obstacles = {};
+  SelfContact self_contact = {};
   VectorOf<Dim> gravity = -9.81 * VectorOf<Dim>::UnitY();  // [m/s2]
   int threads = 1;  // at most so many share a step of a large body; the outcome does not hang on it
 };
@@ -33,7 +34,9 @@ struct ImpulsesOf {
   SpinOf<Dim> effect_moment;    // [N m s]
   SpinOf<Dim> gravity_moment;   // [N m s]
   PointsOf<Dim> hold;           // Dim x held nodes, by what holds them where they are
-  double obstacle_work = 0;     // [J] done on the body by obstacles that move and by what lifts it out of them
+  PointsOf<Dim> internal_nodes = {};  // Dim x N, by the body's own surface: sums to zero and has no moment; empty without
+                                      // self-contact
+  double obstacle_work = 0;  // [J] done on the body by obstacles that move and by what lifts it out of them and of itself
 };
 using Impulses = ImpulsesOf<3>;
 

@@ -39,6 +39,8 @@ class SpringStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return stepper_->substep(dt); }
 
+  void forget() override { stepper_->forget(); }
+
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     for (std::size_t n = 0; n < springs_.obstacles.size(); ++n) {  // their owner may have changed them

@@ -10,7 +10,9 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr double kHeld = 1e12;  // times its own stiffness: what a held node resists with
+constexpr double kHeld = 1e12;           // times its own stiffness: what a held node resists with
+constexpr double kCouplingError = 1e-5;  // of a solution [-], in the norm of the factor
+constexpr int kMostIterations = 200;     // of conjugate gradients; as many as couplings have directions, at most
 
 }  // namespace
 
@@ -121,6 +123,7 @@ void SystemMatrixOf<Dim>::find_factor_pattern(const BodyOf<Dim>& body) {
 template <int Dim>
 void SystemMatrixOf<Dim>::set_zero() {
   std::fill_n(matrix_.valuePtr(), matrix_.nonZeros(), 0.0);
+  couplings_.clear();
 }
 
 template <int Dim>
@@ -250,6 +253,17 @@ void SystemMatrixOf<Dim>::add_contact(int count, const int* nodes, const double*
 }
 
 template <int Dim>
+void SystemMatrixOf<Dim>::add_coupling(int count, const int* nodes, const double* weights, const BlockOf<Dim>& block) {
+  couplings_.emplace_back();
+  Coupling& coupling = couplings_.back();
+  assert(count <= static_cast<int>(coupling.nodes.size()));
+  coupling.count = count;
+  std::copy_n(nodes, count, coupling.nodes.begin());
+  std::copy_n(weights, count, coupling.weights.begin());
+  coupling.block = block;
+}
+
+template <int Dim>
 bool SystemMatrixOf<Dim>::factor() {
   const double* const values = matrix_.valuePtr();
   for (std::size_t k = 0; k < order_.size(); ++k) {
@@ -288,6 +302,61 @@ bool SystemMatrixOf<Dim>::factor() {
 
 template <int Dim>
 void SystemMatrixOf<Dim>::solve_in_place(Eigen::Ref<Eigen::MatrixXd> columns) const {
+  if (couplings_.empty()) return solve_by_factor(columns);
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) solve_with_couplings(columns.col(c));
+}
+
+/// The whole matrix, couplings and all, times x.
+template <int Dim>
+void SystemMatrixOf<Dim>::multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product) const {
+  product.setZero();
+  for (Eigen::Index c = 0; c < matrix_.cols(); ++c) {
+    for (typename Eigen::SparseMatrix<double>::InnerIterator entry(matrix_, c); entry; ++entry) {
+      product[entry.row()] += entry.value() * x[c];
+      if (entry.row() != c) product[c] += entry.value() * x[entry.row()];
+    }
+  }
+  for (const Coupling& coupling : couplings_) {
+    VectorOf<Dim> sum = VectorOf<Dim>::Zero();
+    for (int k = 0; k < coupling.count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      sum += coupling.weights[n] * x.template segment<Dim>(Dim * coupling.nodes[n]);
+    }
+    const VectorOf<Dim> force = coupling.block * sum;
+    for (int k = 0; k < coupling.count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      product.template segment<Dim>(Dim * coupling.nodes[n]) += coupling.weights[n] * force;
+    }
+  }
+}
+
+/// Every iterate from zero on is a direction of descent. Source: Nocedal, Wright, "Numerical optimization", 2006, algorithm 5.3.
+template <int Dim>
+void SystemMatrixOf<Dim>::solve_with_couplings(Eigen::Ref<Eigen::VectorXd> column) const {
+  residual_ = column;
+  column.setZero();
+  preconditioned_.resize(column.size(), 1);
+  product_.resize(column.size());
+  preconditioned_.col(0) = residual_;
+  solve_by_factor(preconditioned_);
+  search_ = preconditioned_.col(0);
+  double along = residual_.dot(search_);
+  const double enough = kCouplingError * kCouplingError * along;
+  for (int k = 0; k < kMostIterations && along > enough; ++k) {
+    multiply(search_, product_);
+    const double step = along / search_.dot(product_);
+    column += step * search_;
+    residual_ -= step * product_;
+    preconditioned_.col(0) = residual_;
+    solve_by_factor(preconditioned_);
+    const double next = residual_.dot(preconditioned_.col(0));
+    search_ = preconditioned_.col(0) + (next / along) * search_;
+    along = next;
+  }
+}
+
+template <int Dim>
+void SystemMatrixOf<Dim>::solve_by_factor(Eigen::Ref<Eigen::MatrixXd> columns) const {
   // Forward and back substitution with all right-hand sides of a row beside each other: one pass over L serves them all.
   const auto nodes = static_cast<Eigen::Index>(order_.size());
   scratch_.resize(columns.rows(), columns.cols());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <array>
 #include <vector>
 
 #include "physics/contact.h"
@@ -33,12 +34,15 @@ class SystemMatrixOf {
   /// The same for `count` nodes and weights >= 0. What couples two nodes without an edge has no place in the matrix and goes
   /// to their diagonals, which makes the matrix larger, never less positive.
   void add_contact(int count, const int* nodes, const double* weights, const BlockOf<Dim>& block);
+  /// The same for weights of any sign and nodes without edges between them, as of two parts of the body that touch: it is kept
+  /// beside the factor, and solutions are found by conjugate gradients on top of that. At most twelve nodes.
+  void add_coupling(int count, const int* nodes, const double* weights, const BlockOf<Dim>& block);
 
   /// Factors the matrix into block L D L^T, up-looking, on the pattern that the constructor found; nothing is allocated.
   /// False: not positive definite.
   /// Source: Davis, "Direct Methods for Sparse Linear Systems", SIAM 2006, chapter 4.
   bool factor();
-  /// x <- A^-1 x for each column; allocates only when the number of columns changes.
+  /// x <- A^-1 x for each column; allocates only when the number of columns changes. With couplings to kCouplingError.
   void solve_in_place(Eigen::Ref<Eigen::MatrixXd> columns) const;
   const Eigen::SparseMatrix<double>& lower() const { return matrix_; }
   Eigen::Index size() const { return matrix_.rows(); }
@@ -47,6 +51,9 @@ class SystemMatrixOf {
   void find_factor_pattern(const BodyOf<Dim>& body);
   void add_off_diagonal(int edge, const BlockOf<Dim>& block);
   void add_diagonal(int node, const BlockOf<Dim>& block);
+  void solve_by_factor(Eigen::Ref<Eigen::MatrixXd> columns) const;
+  void solve_with_couplings(Eigen::Ref<Eigen::VectorXd> column) const;
+  void multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product) const;
   int edge_between(int low, int high) const;  // -1 for none
 
   Eigen::SparseMatrix<double> matrix_;
@@ -69,6 +76,16 @@ class SystemMatrixOf {
   std::vector<Source> source_;  // by rows
   std::vector<BlockOf<Dim>> l_, d_inverse_, work_;
   mutable Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> scratch_;
+
+  struct Coupling {
+    int count;
+    std::array<int, 12> nodes;
+    std::array<double, 12> weights;
+    BlockOf<Dim> block;
+  };
+  std::vector<Coupling> couplings_;
+  mutable Eigen::VectorXd residual_, search_, product_;  // of the conjugate gradients
+  mutable Eigen::MatrixXd preconditioned_;
 };
 using SystemMatrix = SystemMatrixOf<3>;
 

@@ -43,6 +43,8 @@ class XpbdStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / substep_); }
 
+  void forget() override { contact_.forget(); }
+
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     const BodyOf<Dim>& body = scene_.body;
@@ -77,6 +79,7 @@ class XpbdStepper final : public StepperOf<Dim> {
     for (std::size_t n = 0; n < body.held.size(); ++n) {
       const int node = body.held[n];
       impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.contact_nodes.col(node) + held_impulse_.col(node);
+      if (contact_.has_internal()) impulses.hold.col(static_cast<Eigen::Index>(n)) -= impulses.internal_nodes.col(node);
     }
     return Termination::kDone;
   }

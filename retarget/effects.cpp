@@ -33,14 +33,25 @@ double stepping_seconds(const physics::Scene& scene, const physics::State& start
   return (thread_seconds() - began) / (kContactSteps * options.step_s);
 }
 
+/// What `more` of a scene costs: the difference to `less` of it.
+double seconds_between(const physics::Scene& more, const physics::Scene& less, const physics::State& start, const ReplayOptions& options) {
+  std::array<double, kTimings> differences;
+  for (double& difference : differences) {
+    difference = stepping_seconds(more, start, options) - stepping_seconds(less, start, options);
+  }
+  return std::max(0.0, median(differences));
+}
+
 double ground_seconds(const physics::Scene& scene, const physics::State& start, const ReplayOptions& options) {
   physics::Scene free_fall = scene;
   free_fall.has_ground = false;
-  std::array<double, kTimings> differences;
-  for (double& difference : differences) {
-    difference = stepping_seconds(scene, start, options) - stepping_seconds(free_fall, start, options);
-  }
-  return std::max(0.0, median(differences));
+  return seconds_between(scene, free_fall, start, options);
+}
+
+double self_contact_seconds(const physics::Scene& scene, const physics::State& start, const ReplayOptions& options) {
+  physics::Scene without = scene;
+  without.self_contact = {};
+  return seconds_between(scene, without, start, options);
 }
 
 }  // namespace
@@ -62,7 +73,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
   const double damping = seconds_of([&] { physics::add_damping_forces(body, state.x, state.v, force); });
   const double gravity = seconds_of([&] { force.colwise() += performer.scene.gravity; });
   const double embedding = seconds_of([&] { embedded_positions(performer.embedding, state.x); });
-  const bool pushed = !options.pushes.empty();
+  const bool pushed = !options.pushes.empty(), touches_itself = performer.scene.self_contact.is_on;
   const double pushing = pushed ? seconds_of([&] { force += state.v; }) : 0;
 
   return {
@@ -72,7 +83,8 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
        ms(ground_seconds(performer.scene, state, options))},
       {"friction", "on", "feet hold by it; its cost cannot be told from the ground's and is counted there", 0},
       {"obstacles", "off", "there is nothing but the ground", 0},
-      {"self_contact", "off", "not simulated in this version: parts of the body pass through each other", 0},
+      {"self_contact", touches_itself ? "on" : "off", performer.self_contact_reason,
+       touches_itself ? ms(self_contact_seconds(performer.scene, state, options)) : 0},
       {"volume", "on",
        has_elements ? "a part of the elements' law, as far as Poisson's ratio says; counted there"
                     : "the body keeps the volume of each tet by a spring",

@@ -69,6 +69,7 @@ struct SimulationReport {
   double energy_excess_mgl = 0;                     // the most by which energy exceeded its start and the work
   double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
   double volume_error_max = 0, volume_error_end = 0, penetration_max_size = 0;
+  double self_penetration_max_size = 0;  // of the body in itself
   int inverted_elements = 0, inverted_elements_end = 0;  // the most in any step; at the end
   int guard_steps = 0;                                   // in which another method took over
   double travel_length = 0;  // of the COM over the ground's plane

@@ -51,6 +51,7 @@ struct ScenarioOf {
   std::vector<Clamp> clamps;  // those that hold at the start are the scene's body's `held`
   double length = 1, size = 1;  // L [m], longest extent of the rest shape's box; D [m]
   double youngs_modulus = 0;    // [Pa] of the stiffest region
+  std::string self_contact_reason = "nobody asked for it";  // why it is on or off
 };
 
 /// Springs and volume energy with the Lamé parameters of the material, for a lattice whose edges point everywhere: such a

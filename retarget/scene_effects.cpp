@@ -22,17 +22,31 @@ double stepping_seconds(const physics::SceneOf<Dim>& scene, const ScenarioOf<Dim
   return (thread_seconds() - began) / (kContactSteps * options.dt_s);
 }
 
-/// What it costs to have the surroundings, seconds per simulated second from the start on.
+/// What `more` of the scene costs, seconds per simulated second from the start on: the difference to `less` of it.
+template <int Dim>
+double seconds_between(const physics::SceneOf<Dim>& more, const physics::SceneOf<Dim>& less, const ScenarioOf<Dim>& scenario,
+                       const SimulationOptions& options) {
+  std::array<double, kTimings> differences;
+  for (double& difference : differences) {
+    difference = stepping_seconds(more, scenario, options) - stepping_seconds(less, scenario, options);
+  }
+  return std::max(0.0, median(differences));
+}
+
+/// What it costs to have the surroundings.
 template <int Dim>
 double contact_seconds(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
   physics::SceneOf<Dim> empty = scenario.scene;
   empty.has_ground = false;
   empty.obstacles.clear();
-  std::array<double, kTimings> differences;
-  for (double& difference : differences) {
-    difference = stepping_seconds(scenario.scene, scenario, options) - stepping_seconds(empty, scenario, options);
-  }
-  return std::max(0.0, median(differences));
+  return seconds_between(scenario.scene, empty, scenario, options);
+}
+
+template <int Dim>
+double self_contact_seconds(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
+  physics::SceneOf<Dim> without = scenario.scene;
+  without.self_contact = {};
+  return seconds_between(scenario.scene, without, scenario, options);
 }
 
 /// The elastic forces' cost with and without volumes.
@@ -74,7 +88,7 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
   const double contact = touches ? 1000 * contact_seconds(scenario, options) : 0;
   const double gravity = has_gravity ? ms_of([&] { force.colwise() += scene.gravity; }) : 0;
   const double damping = has_damping ? ms_of([&] { physics::add_damping_forces(body, state.x, state.v, force); }) : 0;
-  const bool pushed = !scenario.pushes.empty();
+  const bool pushed = !scenario.pushes.empty(), touches_itself = scene.self_contact.is_on;
   const double pushing = pushed ? ms_of([&] { force += state.v; }) : 0;
   char pull[60];
   std::snprintf(pull, sizeof pull, "%.3g m/s2; timed as a pass over the nodes of its own", scene.gravity.norm());
@@ -88,7 +102,8 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
       {"obstacles", state_of(!scene.obstacles.empty()),
        scene.obstacles.empty() ? "the scene has none" : many(scene.obstacles.size(), "obstacle") + " in the scene; " + in_ground,
        scene.has_ground ? 0 : contact},
-      {"self_contact", "off", "not simulated in this version: parts of the body pass through each other", 0},
+      {"self_contact", state_of(touches_itself), scenario.self_contact_reason + (touches_itself ? "; timed from the start" : ""),
+       touches_itself ? 1000 * self_contact_seconds(scenario, options) : 0},
       {"volume", "on",
        has_volume_springs ? "every element keeps its volume by a spring" : "a part of the elements' law, as far as Poisson's ratio says; counted there",
        volume},

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "physics/internal_forces.h"
+#include "physics/self_contact.h"
 #include "retarget/cpu_seconds.h"
 
 namespace hydrostat::retarget {
@@ -115,6 +116,7 @@ class Course {
   const physics::BodyOf<Dim>& body_;
   std::unique_ptr<physics::StepperOf<Dim>> stepper_;
   physics::InternalForces<Dim> forces_;
+  physics::SelfContactSet<Dim> itself_;
   const long steps_, steps_per_frame_;
   const double mass_, weight_, rest_volume_;
 
@@ -143,6 +145,7 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       body_(scene_.body),
       stepper_(physics::make_stepper(options.method, scene_)),
       forces_(body_),
+      itself_(scene_),
       steps_(std::max(1L, std::lround(options.duration_s / options.dt_s))),
       steps_per_frame_(std::max(1L, std::lround(1 / (options.frame_rate_hz * options.dt_s)))),
       mass_(body_.mass.sum()),
@@ -258,6 +261,7 @@ void Course<Dim>::measure() {
   report.inverted_elements_end = static_cast<int>((physics::jacobians(body_, state_.x).array() <= 0).count());
   report.inverted_elements = std::max(report.inverted_elements, report.inverted_elements_end);
   report.penetration_max_size = std::max(report.penetration_max_size, penetration(scene_, state_) / scenario_.size);
+  report.self_penetration_max_size = std::max(report.self_penetration_max_size, itself_.deepest(state_.x) / scenario_.size);
   report.speed_end_m_s = state_.v.colwise().norm().maxCoeff();
   report.speed_max_m_s = std::max(report.speed_max_m_s, report.speed_end_m_s);
   if (options_.trace) {

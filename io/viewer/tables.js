@@ -10,7 +10,7 @@ const kNames = {
   clip_shape_rms_length: 'shape against the imported clip', shape_rms_length: 'shape against the target',
   world_rms_length: 'position against the target', drift_per_cycle_length: 'drift a cycle', heading_deg_per_cycle: 'heading a cycle',
   travel_per_cycle_length: 'travel a cycle', clip_travel_per_cycle_length: 'travel of the clip', slip_per_stance_length: 'slip a stance',
-  sole_gap_length: 'sole gap', penetration_max_size: 'deepest penetration', volume_error_max: 'volume error, greatest',
+  sole_gap_length: 'sole gap', penetration_max_size: 'deepest penetration', self_penetration_max_size: 'deepest in itself', volume_error_max: 'volume error, greatest',
   momentum_residual_mg: 'momentum unaccounted for', angular_residual_mgl: 'angular momentum unaccounted for',
   external_assist_mg: 'assist from outside', correction_rms: 'correction', real_time_factor: 'speed over real time', duration_s: 'duration',
   fell: 'fell', fall_time_s: 'time of the fall', fall_cause: 'cause of the fall', apex_rise_length: 'highest rise of the COM',

@@ -1,0 +1,272 @@
+#include "physics/self_contact.h"
+
+#include <gtest/gtest.h>
+
+#include "physics/nearest_on_face.h"
+#include "tests/physics/method_cases.h"
+
+namespace hydrostat::physics {
+namespace {
+
+constexpr double kDt = 1.0 / 240;  // [s]
+constexpr double kCell = 0.1;      // [m]
+
+//   +---+---+       +---+---+
+//   |   |   |       |   |   |   two blocks of one body, a cell apart
+//   +---+---+       +---+---+
+//   |   |   |       |   |   |
+//   +---+---+       +---+---+
+template <int Dim>
+SceneOf<Dim> two_blocks(bool with_gravity, const Material& material = {1000, 2e5, 4, 0.01}) {
+  const auto keep = [](int i, int, int) { return i != 2; };
+  SceneOf<Dim> scene = in_the_air(body_of(make_lattice<Dim>(5, 2, 2, kCell, keep), material), with_gravity);
+  scene.self_contact.is_on = true;
+  scene.self_contact.friction = 0.5;
+  return scene;
+}
+template <int Dim>
+bool is_second(const SceneOf<Dim>& scene, int node) {
+  return scene.body.rest(0, node) > 2.5 * kCell;
+}
+
+/// The deepest that any place of the surface lies in an element that is no neighbour of its face [m]: looked for everywhere, by
+/// distance to the nearest face that is none.
+template <int Dim>
+double deepest_inside_itself(const BodyOf<Dim>& body, const PointsOf<Dim>& x) {
+  std::vector<std::set<int>> near(static_cast<std::size_t>(body.node_count()));
+  for (int i = 0; i < body.node_count(); ++i) near[static_cast<std::size_t>(i)].insert(i);
+  for (int e = 0; e < body.edge_count(); ++e) {
+    near[static_cast<std::size_t>(body.edges(0, e))].insert(body.edges(1, e));
+    near[static_cast<std::size_t>(body.edges(1, e))].insert(body.edges(0, e));
+  }
+  const auto are_near = [&](const auto& some, const auto& others) {
+    for (const int a : some) {
+      for (const int b : others) {
+        for (const int c : near[static_cast<std::size_t>(a)]) {
+          if (near[static_cast<std::size_t>(c)].count(b) > 0) return true;
+        }
+      }
+    }
+    return false;
+  };
+  constexpr int kParts = 4;
+  double deepest = 0;
+  const std::vector<SurfaceFace> faces = surface_faces(body);
+  for (const SurfaceFace& face : faces) {
+    const Eigen::Matrix<int, Dim, 1> nodes = nodes_of_face(body, face);
+    for (int i = 0; i <= kParts; ++i) {
+      for (int j = 0; j <= (Dim == 3 ? kParts - i : 0); ++j) {
+        const double weights[3] = {1 - static_cast<double>(i + j) / kParts, static_cast<double>(i) / kParts, static_cast<double>(j) / kParts};
+        VectorOf<Dim> place = VectorOf<Dim>::Zero();
+        for (int k = 0; k < Dim; ++k) place += weights[k] * x.col(nodes[k]);
+        for (int t = 0; t < body.tet_count(); ++t) {
+          BlockOf<Dim> spans;
+          for (int k = 0; k < Dim; ++k) spans.col(k) = x.col(body.tets(k + 1, t)) - x.col(body.tets(0, t));
+          const VectorOf<Dim> inside = spans.inverse() * (place - x.col(body.tets(0, t)));
+          if (!(inside.minCoeff() > 0) || !(inside.sum() < 1) || are_near(nodes, body.tets.col(t))) continue;
+          double depth = 1e300;
+          for (const SurfaceFace& other : faces) {
+            const Eigen::Matrix<int, Dim, 1> corners = nodes_of_face(body, other);
+            if (are_near(nodes, corners)) continue;
+            VectorOf<Dim> foot;
+            const BlockOf<Dim> at = corners_of_face<Dim>(x, corners);
+            nearest_on_face<Dim>(place, at, foot);
+            depth = std::min(depth, (place - at * foot).norm());
+          }
+          deepest = std::max(deepest, depth);
+        }
+      }
+    }
+  }
+  return deepest;
+}
+
+/// By how much more the angular momentum changed in a step than gravity and contact with others say [kg m2/s].
+template <int Dim>
+double unexplained_turn(const SceneOf<Dim>& scene, const StateOf<Dim>& before, const StateOf<Dim>& after,
+                        const ImpulsesOf<Dim>& impulses) {
+  const VectorOf<Dim> origin = VectorOf<Dim>::Zero();
+  return (angular_momentum(scene.body, after.x, after.v, origin) - angular_momentum(scene.body, before.x, before.v, origin) -
+          impulses.gravity_moment - impulses.contact_moment)
+      .norm();
+}
+
+template <typename Type>
+class SelfContacts : public testing::Test {};
+using SelfContactCases =
+    std::conditional_t<kSanitized, testing::Types<Case<2, Method::kExplicit>, Case<2, Method::kImplicit>, Case<2, Method::kEuler>>,
+                       testing::Types<Case<2, Method::kExplicit>, Case<2, Method::kImplicit>, Case<2, Method::kEuler>,
+                                      Case<2, Method::kXpbd>, Case<2, Method::kSpring>, Case<3, Method::kExplicit>,
+                                      Case<3, Method::kImplicit>, Case<3, Method::kEuler>>>;
+TYPED_TEST_SUITE(SelfContacts, SelfContactCases, CaseName);
+
+TYPED_TEST(SelfContacts, LetTwoBlocksCollideWithoutAnyOneOutsideKnowing) {
+  constexpr int Dim = TypeParam::kDim;
+  constexpr Method kMethod = TypeParam::kMethod;
+  for (unsigned seed = 0; seed < trials(3u); ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const SceneOf<Dim> scene = two_blocks<Dim>(false);
+    StateOf<Dim> start{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
+    const BlockOf<Dim> turn = random_rotation<Dim>(random);
+    const VectorOf<Dim> middle = vec<Dim>(4 * kCell, kCell, kCell), aside = random_points<Dim>(random, 1, 0.05).col(0);
+    for (int i = 0; i < scene.body.node_count(); ++i) {
+      if (!is_second(scene, i)) continue;
+      start.x.col(i) = middle + vec<Dim>(kCell, 0, 0) + aside + turn * (start.x.col(i) - middle);
+      start.v.col(i) = vec<Dim>(-1.5, 0, 0);
+    }
+    const double mass = scene.body.mass.sum(), energy_at_first = kinetic_energy(scene.body, start.v);
+    double touched = 0, deepest = 0;
+    int steps = 0;
+    const StateOf<Dim> end = simulate(
+        kMethod, scene, start, kDt, 120, [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
+          EXPECT_LT((momentum(scene.body, after.v) - momentum(scene.body, before.v)).norm(), mass * linear_tolerance(kMethod));
+          EXPECT_LT(unexplained_turn(scene, before, after, impulses), mass * angular_tolerance(kMethod));
+          EXPECT_EQ(impulses.contact_nodes.norm(), 0);
+          EXPECT_LT(impulses.internal_nodes.rowwise().sum().norm(), 1e-12 * mass);
+          touched += impulses.internal_nodes.norm();
+          if (++steps % 4 == 0) deepest = std::max(deepest, deepest_inside_itself(scene.body, after.x));
+        });
+    if (kSanitized) continue;  // the rest is of the end
+    EXPECT_GT(touched, 0.5);
+    EXPECT_LT(deepest, 0.02 * size_of(scene.body));
+    EXPECT_LT(kinetic_energy(scene.body, end.v), energy_at_first);
+    VectorOf<Dim> first = VectorOf<Dim>::Zero(), second = first;
+    for (int i = 0; i < scene.body.node_count(); ++i) (is_second(scene, i) ? second : first) += scene.body.mass[i] * end.v.col(i);
+    EXPECT_GT(second.x(), first.x() - 0.05 * mass);  // they part
+  }
+}
+
+/// The second block laid on the first, which is held, both tilted against gravity.
+template <int Dim>
+StateOf<Dim> piled(SceneOf<Dim>& scene, double degrees, double overlap) {
+  StateOf<Dim> start{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
+  for (int i = 0; i < scene.body.node_count(); ++i) {
+    if (is_second(scene, i)) {
+      start.x.col(i) += vec<Dim>(-3 * kCell, 2 * kCell - overlap, 0);
+    } else {
+      scene.body.held.push_back(i);
+    }
+  }
+  scene.gravity = 9.81 * (tilt<Dim>(degrees) * -VectorOf<Dim>::UnitY());
+  return start;
+}
+
+template <int Dim>
+double speed_of_second(const SceneOf<Dim>& scene, const StateOf<Dim>& state) {
+  double momentum = 0, mass = 0;
+  for (int i = 0; i < scene.body.node_count(); ++i) {
+    if (!is_second(scene, i)) continue;
+    momentum += scene.body.mass[i] * state.v(0, i);
+    mass += scene.body.mass[i];
+  }
+  return momentum / mass;
+}
+
+TYPED_TEST(SelfContacts, HoldABlockOnABlockWithinTheConeAndLetItSlideBeyond) {
+  constexpr int Dim = TypeParam::kDim;
+  if (is_draft(TypeParam::kMethod)) GTEST_SKIP() << "a draft's friction is not to be trusted to a few percent";
+  for (const double friction : {0.5, 0.3}) {
+    SCOPED_TRACE(friction);
+    SceneOf<Dim> scene = two_blocks<Dim>(true, {1000, 2e6, 4, 0.01});
+    scene.self_contact.friction = friction;
+    const StateOf<Dim> start = piled(scene, 20, 0);
+    double speed = 0, held = 0;
+    int steps = 0;
+    const StateOf<Dim> end = simulate(TypeParam::kMethod, scene, start, kDt, 96,
+                                      [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
+                                        if (++steps == 48) speed = speed_of_second(scene, after);
+                                        if (steps > 48) held += impulses.hold.row(1).sum();
+                                      });
+    if (kSanitized) continue;  // the rest is of the end
+    const double faster = speed_of_second(scene, end) - speed, angle = 20 * 3.14159265358979323846 / 180;
+    const double expected = friction > std::tan(angle) ? 0 : 9.81 * (std::sin(angle) - friction * std::cos(angle));
+    EXPECT_NEAR(faster / (48 * kDt), expected, 0.03 * 9.81);
+    EXPECT_NEAR(held / (48 * kDt) / (scene.body.mass.sum() * 9.81 * std::cos(angle)), 1, 0.03);  // it bears both
+    EXPECT_LT(deepest_inside_itself(scene.body, end.x), 0.005 * size_of(scene.body));
+  }
+}
+
+TYPED_TEST(SelfContacts, PushApartWhatOverlapsAtTheStartWithoutThrowingIt) {
+  constexpr int Dim = TypeParam::kDim;
+  for (const double overlap : {0.2 * kCell, 0.8 * kCell}) {
+    SCOPED_TRACE(overlap);
+    SceneOf<Dim> scene = two_blocks<Dim>(true, {1000, 2e6, 4, 0.01});
+    const StateOf<Dim> start = piled(scene, 0, overlap);
+    double fastest = 0;
+    const StateOf<Dim> end = simulate(TypeParam::kMethod, scene, start, kDt, 240,
+                                      [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
+                                        fastest = std::max(fastest, after.v.colwise().norm().maxCoeff());
+                                      });
+    if (kSanitized) continue;  // the rest is of the end
+    EXPECT_LT(deepest_inside_itself(scene.body, end.x), 0.005 * size_of(scene.body));
+    EXPECT_LT(fastest, 4 * push_out_speed(scene));
+    EXPECT_LT(end.v.colwise().norm().maxCoeff(), 0.05);
+    for (int i = 0; i < scene.body.node_count(); ++i) {
+      if (is_second(scene, i)) EXPECT_GT(end.x(1, i), 1.9 * kCell);  // it lies on the other
+    }
+  }
+}
+
+TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
+  constexpr int Dim = TypeParam::kDim;
+  constexpr Method kMethod = TypeParam::kMethod;
+  SceneOf<Dim> scene = in_the_air(bar<Dim>(Dim == 3 ? 16 : 24, 2, 1, kCell, {1000, 2e5, 4, 0.01}), false);
+  scene.self_contact.is_on = true;
+  Eigen::VectorXd curled = passive(scene.body);
+  for (int e = 0; e < scene.body.edge_count(); ++e) {
+    const VectorOf<Dim> span = scene.body.rest.col(scene.body.edges(1, e)) - scene.body.rest.col(scene.body.edges(0, e));
+    const double height = (scene.body.rest(1, scene.body.edges(0, e)) + scene.body.rest(1, scene.body.edges(1, e))) / 2;
+    curled[e] += 0.6 * (height / kCell - 1) * std::pow(span.normalized().x(), 2);
+  }
+  for (const bool on : {true, false}) {
+    SCOPED_TRACE(on ? "on" : "off");
+    scene.self_contact.is_on = on;
+    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(kMethod, scene);
+    ImpulsesOf<Dim> impulses = make_impulses(scene);
+    StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
+    double touched = 0, deepest = 0;
+    const double mass = scene.body.mass.sum();
+    for (int k = 0; k < few_steps(240); ++k) {
+      const StateOf<Dim> before = state;
+      const Eigen::VectorXd activation = passive(scene.body) + std::min(1.0, k / 120.0) * (curled - passive(scene.body));
+      ASSERT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone) << k;
+      EXPECT_LT((momentum(scene.body, state.v) - momentum(scene.body, before.v)).norm(), mass * linear_tolerance(kMethod));
+      if (stepper->guard_steps() == 0) {
+        EXPECT_LT(unexplained_turn(scene, before, state, impulses), mass * angular_tolerance(kMethod));
+      }
+      touched += impulses.internal_nodes.norm();
+      if (k % 16 == 0) deepest = std::max(deepest, deepest_inside_itself(scene.body, state.x));
+    }
+    if (kSanitized) continue;  // the rest is of the end
+    if (on) {
+      EXPECT_GT(touched, 0);
+      EXPECT_LT(deepest, 0.02 * size_of(scene.body));
+    } else {
+      EXPECT_GT(deepest, 0.05 * size_of(scene.body));  // it would go through itself
+    }
+  }
+}
+
+TEST(SelfContactSets, FindNothingInABodyThatIsOnlyStrained) {
+  const auto expect_nothing = []<int Dim>(const SceneOf<Dim>& scene, std::mt19937& random) {
+    for (int n = 0; n < trials(20); ++n) {
+      SCOPED_TRACE(n);
+      BlockOf<Dim> strain = BlockOf<Dim>::Identity() + random_points<Dim>(random, Dim, 0.6);
+      if (n == 0) strain = vec<Dim>(1.5, 0.3, 1.5).asDiagonal();  // between two plates
+      if (!(strain.determinant() > 0.1)) continue;
+      SelfContactSet<Dim> set(scene);
+      EXPECT_EQ(set.deepest(strain * scene.body.rest), 0);
+    }
+  };
+  std::mt19937 random(3);
+  SceneOf<2> flat = scene_of(four_legged<2>(), {});
+  flat.self_contact.is_on = true;
+  expect_nothing(flat, random);
+  SceneOf<3> whole = scene_of(four_legged<3>(), {});
+  whole.self_contact.is_on = true;
+  expect_nothing(whole, random);
+}
+
+}  // namespace
+}  // namespace hydrostat::physics

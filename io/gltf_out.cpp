@@ -171,6 +171,7 @@ void add_skeleton(tinygltf::Model& model, BufferWriter& buffer, const retarget::
   mesh_node.skin = 0;
   tinygltf::Node root;
   root.name = options.name + " nodes";
+  if (!options.place.isZero(0)) root.translation = {options.place.x(), options.place.y(), options.place.z()};
   tinygltf::Skin skin;
   skin.name = options.name;
   skin.skeleton = 1;

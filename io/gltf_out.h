@@ -11,6 +11,7 @@ namespace hydrostat::io {
 
 struct GltfOptions {
   std::string name = "creature";                        // of the scene's nodes and of the animation
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();      // [m] of the origin that body and motion are about, in the file's world
   std::array<double, 4> colour{0.80, 0.45, 0.30, 1.0};  // of the skin: linear red, green, blue, alpha in 0..1
 };
 

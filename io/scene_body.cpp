@@ -113,7 +113,7 @@ std::string scene_body_text(const retarget::ScenarioOf<Dim>& scenario) {
   const physics::SceneOf<Dim>& scene = scenario.scene;
   const physics::BodyOf<Dim>& body = scene.body;
   Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, body.node_count());
-  nodes.template topRows<Dim>() = body.rest;
+  nodes.template topRows<Dim>() = body.rest.colwise() + scenario.origin;
   Json json;
   json["schema"] = "hydrostat.body/1";
   json["dimension"] = Dim;

@@ -21,6 +21,7 @@ constexpr double kSteepest = 80;             // [deg] of the ground
 constexpr double kMostActivation = 0.95;     // of all waves on one constraint: 1 would let it vanish
 constexpr double kLeastPoissonsRatio = 0.25; // of springs
 constexpr double kFriction = 0.8;
+constexpr double kOrigins = 64;              // [m] between the places that may be the local origin
 const std::string kSprings = "springs";
 const std::vector<std::string> kLaws{kSprings, "stable_neo_hookean", "corotated_linear"};
 const std::vector<std::string> kWishes{"auto", "on", "off"};
@@ -35,6 +36,8 @@ class SceneReader {
   ScenarioOf<Dim> read() {
     const std::optional<TomlReader> body = root_.table("body");
     if (!body) throw root_.refusal("", "there is no [body]", "Add [body] with shape = \"...\".");
+    // A whole multiple of a power of two, so that places are taken off it and put back without rounding.
+    scenario_.origin = kOrigins * (body->numbers_or("position_m", VectorOf<Dim>::Zero(), kPlace) / kOrigins).array().round();
     mesh_ = body_mesh<Dim>(*body, scene_.shape, scene_.element, scene_.warnings);
     read_material();
     for (const TomlReader& wave : root_.tables("activation")) read_wave(wave);
@@ -50,7 +53,10 @@ class SceneReader {
   }
 
  private:
-  static VectorOf<Dim> place_of(const TomlReader& table) { return table.numbers_or("position_m", VectorOf<Dim>::Zero(), kPlace); }
+  /// About the scenario's own origin.
+  VectorOf<Dim> place_of(const TomlReader& table) const {
+    return table.numbers_or("position_m", VectorOf<Dim>::Zero(), kPlace) - scenario_.origin;
+  }
 
   physics::ElementMaterial material_of(const TomlReader& table, const physics::ElementMaterial& otherwise) const {
     physics::ElementMaterial material;
@@ -171,7 +177,7 @@ class SceneReader {
       scene.ground.normal = VectorOf<Dim>::Zero();
       scene.ground.normal[0] = -std::sin(slope);
       scene.ground.normal[1] = std::cos(slope);
-      scene.ground.offset = ground->number_or("height_m", 0, kPlace) * scene.ground.normal[1];
+      scene.ground.offset = ground->number_or("height_m", 0, kPlace) * scene.ground.normal[1] - scene.ground.normal.dot(scenario_.origin);
       scene.ground.friction = ground->number_or("friction", kFriction, kFrictionRange);
       ground->refuse_others();
     }

@@ -107,10 +107,11 @@ std::vector<PageChart> charts_of(const ScenarioOf<Dim>& scenario, const Simulati
 
 void write_simulation_glb(const std::filesystem::path& path, const SceneFile& scene, const Simulation& simulation) {
   std::visit(
-      [&](const auto& scenario) {
+      [&]<int Dim>(const ScenarioOf<Dim>& scenario) {
         const ShownBody body = shown_body(scenario);
         GltfOptions options;
         options.name = scene.shape;
+        options.place.head<Dim>() = scenario.origin;
         write_skinned_glb(path, {body.skin.vertices, body.skin.triangles, body.embedding}, body.mesh, body.mass,
                           shown_motion(scenario, simulation.motion), options);
       },

@@ -11,8 +11,8 @@
 namespace hydrostat::physics {
 
 /// A binary tree of boxes over things that move: its shape is made once, its boxes follow.
-/// Source: van den Bergen, "Efficient collision detection of complex deformable models using AABB trees", Journal of Graphics
-/// Tools 2(4), 1997.
+/// Source: van den Bergen, "Efficient collision detection of complex deformable models using AABB trees", Journal of
+/// Graphics Tools 2(4), 1997.
 template <int Dim>
 class BoxTree {
  public:
@@ -75,7 +75,8 @@ class BoxTree {
     const auto at = static_cast<int>(boxes_.size());
     boxes_.push_back({VectorOf<Dim>::Zero(), VectorOf<Dim>::Zero(), -1, -1, begin, end});
     if (end - begin <= kThingsOfLeaf) return at;
-    VectorOf<Dim> least = low.col(order_[static_cast<std::size_t>(begin)]), most = high.col(order_[static_cast<std::size_t>(begin)]);
+    VectorOf<Dim> least = low.col(order_[static_cast<std::size_t>(begin)]),
+                  most = high.col(order_[static_cast<std::size_t>(begin)]);
     for (int n = begin; n < end; ++n) {
       least = least.cwiseMin(low.col(order_[static_cast<std::size_t>(n)]));
       most = most.cwiseMax(high.col(order_[static_cast<std::size_t>(n)]));

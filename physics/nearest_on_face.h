@@ -6,9 +6,9 @@
 
 namespace hydrostat::physics {
 
-/// The point of a triangle (segment in 2D), whose corners are columns, that is nearest to `point`, by its barycentric weights,
-/// and the feature that it lies on: 0 the face, 1 + k the edge from corner k, 4 + k corner k.
-/// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
+/// The point of a triangle (segment in 2D), whose corners are columns, that is nearest to `point`, by its barycentric
+/// weights, and the feature that it lies on: 0 the face, 1 + k the edge from corner k, 4 + k corner k. Source: Ericson,
+/// "Real-Time Collision Detection", 2005, section 5.1.5.
 template <int Dim>
 int nearest_on_face(const VectorOf<Dim>& point, const BlockOf<Dim>& corners, VectorOf<Dim>& weights) {
   if constexpr (Dim == 3) {
@@ -43,8 +43,8 @@ int nearest_on_face(const VectorOf<Dim>& point, const BlockOf<Dim>& corners, Vec
   }
 }
 
-/// Perpendicular to a face whose corners are columns, outward where they are counter-clockwise seen from outside (2D: with the
-/// inside on their left). Its length is twice the area (2D: the length) of the face.
+/// Perpendicular to a face whose corners are columns, outward where they are counter-clockwise seen from outside (2D: with
+/// the inside on their left). Its length is twice the area (2D: the length) of the face.
 template <int Dim>
 VectorOf<Dim> face_normal(const BlockOf<Dim>& corners) {
   const VectorOf<Dim> along = corners.col(1) - corners.col(0);

@@ -11,10 +11,11 @@ namespace hydrostat::physics {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kRings = 2;             // of neighbours along the mesh that never touch
-constexpr double kDeepest = 0.5;      // of a tet's altitude [-]: a node deeper behind its face came in elsewhere
-constexpr double kBeside = 0.25;      // of a tet's size [-]: a node farther beside it is not behind its face
-// Of the shorter of two edges that cross [-]. Near a corner a pair may begin to cross that has a shorter way out: it is none.
+constexpr int kRings = 2;         // of neighbours along the mesh that never touch
+constexpr double kDeepest = 0.5;  // of a tet's altitude [-]: a node deeper behind its face came in elsewhere
+constexpr double kBeside = 0.25;  // of a tet's size [-]: a node farther beside it is not behind its face
+// Of the shorter of two edges that cross [-]. Near a corner a pair may begin to cross that has a shorter way out: it is
+// none.
 constexpr double kDeepestEdge = 0.25;
 constexpr double kDeepestNewEdge = 0.02;
 constexpr double kLeastSine = 0.1;     // of the angle between two edges that cross
@@ -42,8 +43,8 @@ template <int Dim>
 SelfContactSet<Dim>::SelfContactSet(const SceneOf<Dim>& scene) : scene_(scene) {
   if (!scene.self_contact.is_on) return;
   inverse_mass_ = inverse_masses(scene.body);
-  find_neighbours();
   find_surface();
+  find_neighbours();
   if (Dim == 3) find_edges();
   if (faces_.cols() == 0) return;
   const std::size_t places = points_.size() + edges_.size();
@@ -94,10 +95,10 @@ void SelfContactSet<Dim>::find_neighbours() {
       }
     }
   }
-  near_.assign(count * count, false);
+  near_.assign(points_.size() * count, false);
   const double near_at_rest = scene_.self_contact.near_at_rest;
-  for (std::size_t n = 0; n < count; ++n) {
-    const auto node = static_cast<int>(n);
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    const int node = points_[p];
     std::vector<int> near{node};
     for (int ring = 0; ring < kRings; ++ring) {
       for (std::size_t k = 0, known = near.size(); k < known; ++k) {
@@ -107,9 +108,10 @@ void SelfContactSet<Dim>::find_neighbours() {
       std::sort(near.begin(), near.end());
       near.erase(std::unique(near.begin(), near.end()), near.end());
     }
-    for (const int other : near) near_[n * count + static_cast<std::size_t>(other)] = true;
+    for (const int other : near) near_[p * count + static_cast<std::size_t>(other)] = true;
     for (int other = 0; near_at_rest > 0 && other < body.node_count(); ++other) {
-      if ((body.rest.col(other) - body.rest.col(node)).norm() < near_at_rest) near_[n * count + static_cast<std::size_t>(other)] = true;
+      if ((body.rest.col(other) - body.rest.col(node)).norm() < near_at_rest)
+        near_[p * count + static_cast<std::size_t>(other)] = true;
     }
   }
 }
@@ -127,19 +129,17 @@ void SelfContactSet<Dim>::find_surface() {
   faces_.resize(Dim, static_cast<Eigen::Index>(all.size()));
   for (const SurfaceFace& face : all) {
     const Eigen::Matrix<int, Dim, 1> nodes = nodes_of_face(body, face);
-    bool meets = false;
-    for (const int node : nodes) {
-      if (!meets_any(node)) continue;
-      meets = true;
-      is_point[static_cast<std::size_t>(node)] = 1;
-    }
-    if (!meets) continue;
+    if (std::none_of(nodes.begin(), nodes.end(), meets_any)) continue;
+    for (const int node : nodes) is_point[static_cast<std::size_t>(node)] = 1;
     faces_.col(static_cast<Eigen::Index>(owners_.size())) = nodes;
     owners_.push_back(face);
   }
   faces_.conservativeResize(Dim, static_cast<Eigen::Index>(owners_.size()));
+  point_of_.assign(static_cast<std::size_t>(body.node_count()), -1);
   for (int n = 0; n < body.node_count(); ++n) {
-    if (is_point[static_cast<std::size_t>(n)]) points_.push_back(n);
+    if (!is_point[static_cast<std::size_t>(n)]) continue;
+    point_of_[static_cast<std::size_t>(n)] = static_cast<int>(points_.size());
+    points_.push_back(n);
   }
 }
 
@@ -160,7 +160,8 @@ void SelfContactSet<Dim>::find_edges() {
 
 template <int Dim>
 bool SelfContactSet<Dim>::is_near(int a, int b) const {
-  return near_[static_cast<std::size_t>(a) * piece_.size() + static_cast<std::size_t>(b)];
+  const auto point = static_cast<std::size_t>(point_of_[static_cast<std::size_t>(a)]);
+  return near_[point * piece_.size() + static_cast<std::size_t>(b)];
 }
 
 template <int Dim>
@@ -197,7 +198,8 @@ void SelfContactSet<Dim>::gather_partners(const PointsOf<Dim>& x, int place, dou
     const VectorOf<Dim> low = x.col(ends[0]).cwiseMin(x.col(ends[1])).array() - distance;
     const VectorOf<Dim> high = x.col(ends[0]).cwiseMax(x.col(ends[1])).array() + distance;
     face_tree_.visit(low, high, [&](int f) {
-      for (int o = std::max(e + 1, edge_begin_[static_cast<std::size_t>(f)]); o < edge_begin_[static_cast<std::size_t>(f) + 1]; ++o) {
+      for (int o = std::max(e + 1, edge_begin_[static_cast<std::size_t>(f)]);
+           o < edge_begin_[static_cast<std::size_t>(f) + 1]; ++o) {
         const Eigen::Vector2i other = edges_[static_cast<std::size_t>(o)].nodes;
         if ((x.col(other[0]).cwiseMin(x.col(other[1])).array() > high.array()).any() ||
             (x.col(other[0]).cwiseMax(x.col(other[1])).array() < low.array()).any()) {
@@ -225,7 +227,8 @@ void SelfContactSet<Dim>::gather(const PointsOf<Dim>& x, double reach) {
 }
 
 template <int Dim>
-void SelfContactSet<Dim>::find(const PointsOf<Dim>& x, double reach, int first_slot, std::vector<ContactOf<Dim>>& candidates) {
+void SelfContactSet<Dim>::find(const PointsOf<Dim>& x, double reach, int first_slot,
+                               std::vector<ContactOf<Dim>>& candidates) {
   double moved = 0;
   if (gathered_reach_ >= 0) moved = std::sqrt((x - gathered_at_).colwise().squaredNorm().maxCoeff());
   if (!(moved + reach <= gathered_reach_)) gather(x, reach + spare_reach_);
@@ -367,7 +370,8 @@ void SelfContactSet<Dim>::face_edge(const PointsOf<Dim>& x, ContactOf<Dim>& cont
       for (const int f : of.faces) sum += face_normal<3>(corners_of_face<3>(x, faces_.col(f))).normalized();
       return sum / 2;
     };
-    // Whether what touches the edge along `normal` touches neither face beside it first: all three are perpendicular to the edge.
+    // Whether what touches the edge along `normal` touches neither face beside it first: all three are perpendicular to the
+    // edge.
     const auto is_between = [](const VectorOf<3>& normal, const VectorOf<3>& out) {
       const double cosine = out.norm();
       return normal.dot(out) > (cosine - kBeyond) * cosine;

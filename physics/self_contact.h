@@ -7,12 +7,12 @@
 
 namespace hydrostat::physics {
 
-/// Finds where a body's surface may touch itself: every node of the surface against the nearest face that is no neighbour of it
-/// along the mesh and, in 3D, every edge of the surface against the nearest such edge that it crosses.
+/// Finds where a body's surface may touch itself: every node of the surface against the nearest face that is no neighbour of
+/// it along the mesh and, in 3D, every edge of the surface against the nearest such edge that it crosses.
 ///
-/// A node that is behind a face is inside the body only as far as the tet there is thick; one that is found within a tet that is
-/// no neighbour, as where a fold overlaps at the start, is led out by the face that is nearest to it in the rest shape.
-/// Forces are equal and opposite in one point (ContactOf), so that neither momentum nor angular momentum changes.
+/// A node that is behind a face is inside the body only as far as the tet there is thick; one that is found within a tet
+/// that is no neighbour, as where a fold overlaps at the start, is led out by the face that is nearest to it in the rest
+/// shape. Forces are equal and opposite in one point (ContactOf), so that neither momentum nor angular momentum changes.
 /// Sources: Bridson, Fedkiw, Anderson, "Robust treatment of collisions, contact and friction for cloth animation", SIGGRAPH
 /// 2002, section 6, for nodes against faces and edges against edges; McAdams et al., "Efficient elasticity for character
 /// skinning with contact and collisions", SIGGRAPH 2011, section 6, for depth as the rest shape has it.
@@ -24,9 +24,9 @@ class SelfContactSet {
 
   bool is_empty() const { return slot_count_ == 0; }
   int slot_count() const { return slot_count_; }
-  /// Adds to `candidates`, from `first_slot` on, the places that may come to touch while no node moves more than `reach` [m].
-  /// Takes memory only where places have more neighbours than ever before. What is near is gathered somewhat farther out and
-  /// kept until the nodes have moved that far.
+  /// Adds to `candidates`, from `first_slot` on, the places that may come to touch while no node moves more than `reach`
+  /// [m]. Takes memory only where places have more neighbours than ever before. What is near is gathered somewhat farther
+  /// out and kept until the nodes have moved that far.
   void find(const PointsOf<Dim>& x, double reach, int first_slot, std::vector<ContactOf<Dim>>& candidates);
   /// Brings a candidate to `x`: its gap is infinite where it faces nothing.
   void update(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const;
@@ -59,14 +59,15 @@ class SelfContactSet {
 
   const SceneOf<Dim>& scene_;
   int slot_count_ = 0;
-  Eigen::VectorXd inverse_mass_;                // [1/kg] N
+  Eigen::VectorXd inverse_mass_;                   // [1/kg] N
   Eigen::Matrix<int, Dim, Eigen::Dynamic> faces_;  // nodes
-  std::vector<SurfaceFace> owners_;             // of each face
-  std::vector<int> points_;                     // nodes of the surface: the first places
-  std::vector<Edge> edges_;                     // the places behind them
-  std::vector<int> edge_begin_;                 // faces + 1: of the edges that a face brings
-  std::vector<bool> near_;                      // N x N: what is too near along the mesh to touch
-  std::vector<int> piece_;                      // of each node: what hangs together has one number
+  std::vector<SurfaceFace> owners_;                // of each face
+  std::vector<int> points_;                        // nodes of the surface: the first places
+  std::vector<Edge> edges_;                        // the places behind them
+  std::vector<int> edge_begin_;                    // faces + 1: of the edges that a face brings
+  std::vector<int> point_of_;                      // of each node, or -1
+  std::vector<bool> near_;                         // points x N: what is too near along the mesh to touch
+  std::vector<int> piece_;                         // of each node: what hangs together has one number
   PointsOf<Dim> face_low_, face_high_, tet_low_, tet_high_;
   BoxTree<Dim> face_tree_, tet_tree_;
   std::vector<int> partner_begin_, partner_end_, partners_;  // of each place: faces, or edges

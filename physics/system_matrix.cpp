@@ -11,7 +11,7 @@ namespace hydrostat::physics {
 namespace {
 
 constexpr double kHeld = 1e12;           // times its own stiffness: what a held node resists with
-constexpr double kCouplingError = 1e-5;  // of a solution [-], in the norm of the factor
+constexpr double kCouplingError = 1e-3;  // of a solution [-], in the norm of the factor
 constexpr int kMostIterations = 200;     // of conjugate gradients; as many as couplings have directions, at most
 
 }  // namespace

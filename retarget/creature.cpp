@@ -17,6 +17,7 @@ constexpr double kLoopTolerance = 0.02;            // of L
 constexpr double kRecoveredStillSpeed = 0.6;       // of the RMS speed: the pace of a clip in place is known that well
 constexpr const char* kFromFeet = "from feet";
 constexpr double kOwnTravel = 0.05;                // of L: less is a clip in place, which is there to be repeated
+constexpr double kOrigins = 256;                   // [m] between the places that a clip may be brought from
 constexpr double kFlight = 0.05;                   // of D above the ground
 
 void scale_character(Character& character, double scale) {
@@ -55,6 +56,20 @@ physics::Body element_body(const Creature& creature, const CreatureOptions& opti
                                                                         : physics::ElasticLaw::kStableNeoHookean;
   body_options.damping_time = options.damping_time * std::sqrt(creature.length);
   return physics::make_body<3>(elements, mesh.tets, body_options);
+}
+
+/// Takes a clip that begins far from its origin to it, by whole multiples of a power of two so that nothing is rounded. Returns how
+/// far away it was [m].
+double bring_to_origin(Character& character) {
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  if (character.clip.bone_pose.empty() || character.clip.bone_pose.front().empty()) return 0;
+  for (const Eigen::Affine3d& pose : character.clip.bone_pose.front()) shift += pose.translation();
+  shift = kOrigins * (shift / static_cast<double>(character.clip.bone_pose.front().size()) / kOrigins).array().round();
+  if (shift.isZero(0)) return 0;
+  for (auto& frame : character.clip.bone_pose) {
+    for (Eigen::Affine3d& pose : frame) pose.translation() -= shift;
+  }
+  return shift.norm();
 }
 
 /// The skin's vertices with the moves that made the clip a loop with its travel on the ground. `loop` is the clip as
@@ -114,6 +129,11 @@ Creature make_creature(const Character& character, const CreatureOptions& option
   }
   if (creature.scale != 1) scale_character(creature.character, creature.scale);
   creature.length = extent.maxCoeff() * creature.scale;
+  if (const double away = bring_to_origin(creature.character); away > 0) {
+    char text[120];
+    std::snprintf(text, sizeof text, "the clip begins far from its origin: the creature is moved by %.0f m to stand near it", away);
+    creature.warnings.push_back(text);
+  }
 
   BodyOptions body_options;
   body_options.nodes = options.nodes;

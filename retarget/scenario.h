@@ -40,7 +40,8 @@ struct Clamp {
   double until_s = 1e300;
 };
 
-/// A body and all that happens to it: what a simulation without a clip starts from.
+/// A body and all that happens to it: what a simulation without a clip starts from. All places are about a local origin, so that
+/// far from the world's no digits are lost.
 template <int Dim>
 struct ScenarioOf {
   physics::SceneOf<Dim> scene;
@@ -49,6 +50,7 @@ struct ScenarioOf {
   std::vector<PushOf<Dim>> pushes;
   std::vector<MoveOf<Dim>> moves;
   std::vector<Clamp> clamps;  // those that hold at the start are the scene's body's `held`
+  physics::VectorOf<Dim> origin = physics::VectorOf<Dim>::Zero();  // [m] the local one in the world
   double length = 1, size = 1;  // L [m], longest extent of the rest shape's box; D [m]
   double youngs_modulus = 0;    // [Pa] of the stiffest region
   std::string self_contact_reason = "nobody asked for it";  // why it is on or off

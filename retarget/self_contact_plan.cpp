@@ -12,9 +12,10 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kNearCells = 2;             // edges of the mesh [-]: parts as near may come to touch
-constexpr double kFarCells = 4;              // parts of a creature that are nearer in the bind pose never touch
-constexpr double kDetour = 3;                // way along the body over the gap [-] from which parts are far from each other
+constexpr double kNearCells = 2;  // edges of the mesh [-]: parts as near may come to touch
+constexpr double kTargetCells = 1;   // parts of a creature that its target brings as near
+constexpr double kFarCells = 4;   // parts of a creature that are nearer in the bind pose never touch
+constexpr double kDetour = 3;     // way along the body over the gap [-] from which parts are far from each other
 constexpr double kRing = 2 * std::numbers::pi;  // length over width of a bar that as a ring is strained by 1
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -65,7 +66,8 @@ std::vector<Facing<Dim>> facing_parts(physics::SelfContactSet<Dim>& set, const p
   for (physics::ContactOf<Dim>& contact : contacts) {
     set.update(x, contact);
     if (!(contact.gap < distance)) continue;
-    parts.push_back({contact.nodes[0], contact.nodes[static_cast<std::size_t>(contact.node_count - 1)], contact.gap, contact});
+    parts.push_back(
+        {contact.nodes[0], contact.nodes[static_cast<std::size_t>(contact.node_count - 1)], contact.gap, contact});
   }
   return parts;
 }
@@ -112,12 +114,13 @@ SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape st
   ways.maxCoeff(&end);
   const double length = ways_from(body, static_cast<int>(end)).maxCoeff(), section = body.rest_volume.sum() / length;
   const double slenderness = length / (Dim == 3 ? std::sqrt(section) : section);
-  if (slenderness >= kRing) return plan(true, sentence("the body is %.1f times as long as wide and may come round to itself", slenderness));
+  if (slenderness >= kRing)
+    return plan(true, sentence("the body is %.1f times as long as wide and may come round to itself", slenderness));
   if (has_near_parts(scene, body.rest_length.mean())) {
     return plan(true, "parts that are far from each other along the body stand within two cells");
   }
-  return plan(false, sentence("the body is %.1f times as long as wide: a ring of it would be strained by %.0f %%", slenderness,
-                              100 * kRing / slenderness));
+  return plan(false, sentence("the body is %.1f times as long as wide: a ring of it would be strained by %.0f %%",
+                              slenderness, 100 * kRing / slenderness));
 }
 
 SelfContactPlan plan_self_contact(const Performer& performer) {
@@ -133,10 +136,11 @@ SelfContactPlan plan_self_contact(const Performer& performer) {
   const Motion& target = performer.prepared.target;
   for (Eigen::Index f = 0; f < target.count(); ++f) {
     const physics::PointsOf<3> x = target.at(f);
-    for (const Facing<3>& part : facing_parts<3>(set, x, kNearCells * cell)) {
+    for (const Facing<3>& part : facing_parts<3>(set, x, kTargetCells * cell)) {
       for (int k = 0; k < part.contact.node_count; ++k) {
         for (int l = 0; l < part.contact.node_count; ++l) {
-          if (part.contact.weights[static_cast<std::size_t>(k)] > 0 && k < part.contact.node_count - 4 && l >= part.contact.node_count - 4) {
+          if (part.contact.weights[static_cast<std::size_t>(k)] > 0 && k < part.contact.node_count - 4 &&
+              l >= part.contact.node_count - 4) {
             meet(part.contact.nodes[static_cast<std::size_t>(k)], part.contact.nodes[static_cast<std::size_t>(l)]) = true;
           }
         }
@@ -147,7 +151,8 @@ SelfContactPlan plan_self_contact(const Performer& performer) {
   plan.settings.friction = performer.scene.ground.friction;
   const Eigen::Index meeting = (meet.rowwise().any()).count();
   if (meeting == 0) {
-    plan.reason = sentence("in the target no two parts that are four cells apart at rest come within two (%.3g m)", kNearCells * cell);
+    plan.reason =
+        sentence("in the target no two parts that are four cells apart at rest come within one (%.3g m)", kTargetCells * cell);
     return plan;
   }
   // What comes near may come nearer beside it.
@@ -171,8 +176,9 @@ SelfContactPlan plan_self_contact(const Performer& performer) {
   plan.settings.near_at_rest = trial.self_contact.near_at_rest;
   plan.settings.region.setLinSpaced(count, 0, count - 1);
   plan.settings.meet = meet || meet.transpose();
-  plan.reason = sentence("in the target %ld nodes of the surface come within two cells (%.3g m) of parts that are four away at rest",
-                         static_cast<long>(meeting), kNearCells * cell);
+  plan.reason =
+      sentence("in the target %ld nodes of the surface come within a cell (%.3g m) of parts that are four away at rest",
+               static_cast<long>(meeting), kTargetCells * cell);
   return plan;
 }
 

@@ -16,15 +16,15 @@ struct SelfContactPlan {
   std::string reason;
 };
 
-/// Of a scene whose body, surroundings, waves and clamps are all there. By itself it is on where parts of the body may come to
-/// meet: there are several pieces, or two parts that are far from each other along the body stand within two cells, or the body is
-/// so slender that bent into a ring it is strained by no more than its own length; and off where nothing bends it, or where it
-/// starts out of shape: it could then not find back through itself.
+/// Of a scene whose body, surroundings, waves and clamps are all there. By itself it is on where parts of the body may come
+/// to meet: there are several pieces, or two parts that are far from each other along the body stand within two cells, or
+/// the body is so slender that bent into a ring it is strained by no more than its own length; and off where nothing bends
+/// it, or where it starts out of shape: it could then not find back through itself.
 template <int Dim>
 SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape start, Wish wish, double friction);
 
-/// Of a creature: on where the target brings parts within two cells of each other that are four or more apart in the bind pose, and
-/// between these alone.
+/// Of a creature: on where the target brings parts within a cell of each other that are four or more apart in the bind
+/// pose, and between these alone.
 SelfContactPlan plan_self_contact(const Performer& performer);
 
 }  // namespace hydrostat::retarget

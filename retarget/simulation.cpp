@@ -119,6 +119,7 @@ class Course {
   physics::SelfContactSet<Dim> itself_;
   const long steps_, steps_per_frame_;
   const double mass_, weight_, rest_volume_;
+  const double energy_of_origin_;  // [J] of the whole mass in the local origin, in the field of gravity
 
   long done_ = 0;
   long guard_steps_ = 0;    // of steppers before this one
@@ -151,6 +152,7 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       mass_(body_.mass.sum()),
       weight_(kGravity * mass_),
       rest_volume_(body_.rest_volume.sum()),
+      energy_of_origin_(-mass_ * scene_.gravity.dot(scenario.origin)),
       state_(scenario.start),
       before_(state_),
       activation_(body_.edge_count()),
@@ -163,7 +165,7 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
   energy_at_start_ = energy().sum();
   SimulationReport& report = result_.report;
   report.dimension = Dim;
-  report.energy_start_mgl = energy_at_start_ / (weight_ * scenario.length);
+  report.energy_start_mgl = (energy_at_start_ + energy_of_origin_) / (weight_ * scenario.length);
   sums_.contact = sums_.effect = effect_;
   sums_.activation = activation_;
   sums_.clear();
@@ -281,13 +283,16 @@ void Course<Dim>::write_row(Eigen::Index row) {
   const double seconds = sums_.steps * options_.dt_s;
   rows_ = row + 1;
   trace.time_s[row] = static_cast<double>(done_) * options_.dt_s;
-  trace.position.col(row) = column_of<Dim>(state_.x);
+  trace.position.col(row) = column_of<Dim>(state_.x.colwise() + scenario_.origin);
   trace.velocity.col(row) = column_of<Dim>(state_.v);
   if (sums_.steps == 0) return;
   trace.contact_force.col(row) = column_of<Dim>(sums_.contact / seconds);
   trace.effect_force.col(row) = column_of<Dim>(sums_.effect / seconds);
-  trace.contact_moment.col(row) = moment_of<Dim>(sums_.contact_moment / seconds);
-  trace.effect_moment.col(row) = moment_of<Dim>(sums_.effect_moment / seconds);
+  const VectorOf<Dim> contact = sums_.contact.rowwise().sum(), effect = sums_.effect.rowwise().sum();
+  const SpinOf<Dim> of_contact = sums_.contact_moment + physics::cross<Dim>(scenario_.origin, contact);
+  const SpinOf<Dim> of_effect = sums_.effect_moment + physics::cross<Dim>(scenario_.origin, effect);
+  trace.contact_moment.col(row) = moment_of<Dim>(of_contact / seconds);
+  trace.effect_moment.col(row) = moment_of<Dim>(of_effect / seconds);
   trace.activation.col(row) = sums_.activation / sums_.steps;
   sums_.clear();
 }
@@ -297,9 +302,9 @@ void Course<Dim>::write_frame() {
   const Energy here = energy();
   frames_.push_back(column_of<Dim>(state_.x));
   travels_.push_back(state_.obstacle_travel);
-  com_.push_back(in_space<Dim>(physics::centre_of_mass(body_, state_.x)));
+  com_.push_back(in_space<Dim>(physics::centre_of_mass(body_, state_.x) + scenario_.origin));
   const double force = impulses_.contact.colwise().norm().sum() / options_.dt_s;
-  course_.push_back({static_cast<double>(done_) * options_.dt_s, here.kinetic, here.elastic, here.gravity, work_,
+  course_.push_back({static_cast<double>(done_) * options_.dt_s, here.kinetic, here.elastic, here.gravity + energy_of_origin_, work_,
                      physics::volume(body_, state_.x) / rest_volume_, penetration(scene_, state_), force / weight_, activation_.mean()});
 }
 
@@ -334,11 +339,12 @@ template <int Dim>
 Simulation Course<Dim>::finish() {
   SimulationReport& report = result_.report;
   report.duration_s = static_cast<double>(done_) * options_.dt_s;
-  report.energy_end_mgl = energy().sum() / (weight_ * scenario_.length);
+  report.energy_end_mgl = (energy().sum() + energy_of_origin_) / (weight_ * scenario_.length);
   report.guard_steps = static_cast<int>(guard_steps_ + stepper_->guard_steps());
   report.work_mgl = work_ / (weight_ * scenario_.length);
   const Eigen::Vector3d up = in_space<Dim>(scene_.has_ground ? scene_.ground.normal : VectorOf<Dim>::UnitY());
-  const Eigen::Vector3d way = in_space<Dim>(physics::centre_of_mass(body_, state_.x)) - com_.front();
+  const Eigen::Vector3d way =
+      in_space<Dim>(physics::centre_of_mass(body_, state_.x) - physics::centre_of_mass(body_, scenario_.start.x));
   report.travel_length = (way - up * up.dot(way)).norm() / scenario_.length;
   if (report.duration_s > 0) report.ms_per_sim_s = 1000 * busy_s_ / report.duration_s;
   if (busy_s_ > 0) report.real_time_factor = report.duration_s / busy_s_;

@@ -28,9 +28,9 @@ struct SimulationCourse {
   Eigen::VectorXd contact_weights;  // sizes of the forces at all contact points, added up
 };
 
-/// What came of a scene. In 2D, z = 0.
+/// What came of a scene. In 2D, z = 0. Course, report and trace are of the world, moments about its origin.
 struct Simulation {
-  Motion motion;                         // nodes, 3N x F
+  Motion motion;                         // nodes, 3N x F, about the scenario's own origin
   std::vector<Motion> obstacle_travels;  // 3 x F, of each obstacle from where the scene has it
   SimulationCourse course;
   SimulationReport report;

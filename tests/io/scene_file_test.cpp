@@ -7,6 +7,7 @@
 
 #include "io/import_worker.h"
 #include "io/write_file.h"
+#include "retarget/simulation.h"
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
@@ -303,6 +304,61 @@ TEST(Scenes, OfTheSamplesAreRead) {
     ++count;
   }
   EXPECT_GE(count, 5);
+}
+
+TEST_F(SceneFiles, TouchThemselvesWhereTheyMayComeToMeet) {
+  struct Scene {
+    std::string text;
+    bool is_on;
+    const char* reason;
+  };
+  const std::string bar = "dimension = 2\n[body]\nshape = \"bar\"\nsize_m = [2.0, 0.2]\n", ground = "[ground]\nfriction = 0.3\n";
+  const std::string square = "dimension = 2\n[body]\nshape = \"square\"\nsize_m = 1\n";
+  const std::string jaws = "dimension = 2\n[body]\nshape = \"outline\"\nnodes = 200\n"
+                           "outline_m = [[0, 0], [2, 0], [2, 0.9], [0.5, 0.9], [0.5, 1.1], [2, 1.1], [2, 2], [0, 2]]\n";
+  for (const Scene& scene :
+       {Scene{bar, false, "nothing bends"}, Scene{bar + ground, true, "times as long as wide"}, Scene{square + ground, false, "a ring of it"},
+        Scene{jaws + ground, true, "stand within two cells"}, Scene{bar + "start = \"random\"\n" + ground, false, "out of shape"},
+        Scene{square + ground + "[effects]\nself_contact = \"on\"\n", true, "asked for"},
+        Scene{bar + ground + "[effects]\nself_contact = \"off\"\n", false, "turned off"}}) {
+    SCOPED_TRACE(scene.text);
+    const ScenarioOf<2> read = scenario<2>(scene.text);
+    EXPECT_EQ(read.scene.self_contact.is_on, scene.is_on);
+    EXPECT_NE(read.self_contact_reason.find(scene.reason), std::string::npos) << read.self_contact_reason;
+    EXPECT_TRUE(!scene.is_on || read.scene.self_contact.friction == 0.3);
+  }
+  EXPECT_EQ(scenario<2>(bar + ground + "[effects]\nself_friction = 0.7\n").scene.self_contact.friction, 0.7);
+}
+
+TEST_F(SceneFiles, FarFromTheOriginMoveAsNearIt) {
+  std::vector<retarget::Simulation> runs;
+  const Eigen::Vector3d far(10000, 0, -7000);
+  for (const bool is_far : {false, true}) {
+    const std::string x = std::to_string(is_far ? far.x() : 0), z = std::to_string(is_far ? far.z() : 0);
+    const auto scene = scenario<3>("[body]\nshape = \"cube\"\nsize_m = 0.4\nnodes = 30\nposition_m = [" + x + ", 0.45, " + z +
+                                   "]\nrotation_deg = [20, 0, 30]\n[material]\nyoungs_modulus_pa = 2e5\n[ground]\n[[obstacle]]\n"
+                                   "shape = \"ball\"\nsize_m = 0.2\nposition_m = [" + x + ", 0.1, " + z + "]\n");
+    EXPECT_LT(scene.start.x.cwiseAbs().maxCoeff(), 64);
+    retarget::SimulationOptions options;
+    options.duration_s = 0.5;
+    options.trace = true;
+    runs.push_back(retarget::simulate(scene, options));
+  }
+  const retarget::Trace &near = runs[0].trace, &away = runs[1].trace;
+  ASSERT_EQ(near.count(), away.count());
+  double apart = 0, turned = 0;
+  for (Eigen::Index s = 0; s < near.count(); ++s) {
+    const Eigen::Vector3d force = near.contact_force.col(s).reshaped(3, near.mass_kg.size()).rowwise().sum();
+    turned = std::max(turned, (away.contact_moment.col(s) - near.contact_moment.col(s) - far.cross(force)).norm());
+    for (Eigen::Index n = 0; n < near.mass_kg.size(); ++n) {
+      apart = std::max(apart, (away.position.col(s).segment<3>(3 * n) - far - near.position.col(s).segment<3>(3 * n)).norm());
+    }
+  }
+  EXPECT_LT(apart, 1e-9);
+  EXPECT_LT(turned, 1e-4);  // [N m], of forces of some 1000 N with levers of 10 km
+  EXPECT_GT(near.contact_force.norm(), 0);
+  EXPECT_LT(runs[1].report.momentum_residual_mg, 1e-10);
+  EXPECT_LT(runs[1].report.angular_residual_mgl, 1e-10);
 }
 
 }  // namespace

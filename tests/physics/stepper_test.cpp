@@ -325,6 +325,26 @@ TEST(Explicit, AllocatesNothingWhereThreadsShareTheStep) {
   EXPECT_EQ(allocations - before, 0);
 }
 
+TYPED_TEST(Steppers, AllocateNothingInTheStepLoopOfABodyOnItself) {
+  constexpr int Dim = TypeParam::kDim;
+  SceneOf<Dim> scene =
+      in_the_air(body_of(make_lattice<Dim>(7, 2, 1, 0.1, [](int i, int, int) { return i != 3; }), {1000, 2e5, 4, 0.01}), false);
+  scene.self_contact.is_on = true;
+  StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
+  for (int i = 0; i < scene.body.node_count(); ++i) {  // two pieces pressed together
+    if (state.x(0, i) > 0.35) state.x(0, i) -= 0.1;
+    state.v(0, i) = state.x(0, i) < 0.32 && scene.body.rest(0, i) < 0.35 ? 0.2 : -0.2;
+  }
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  for (int k = 0; k < 4; ++k) stepper->step(kDt, passive(scene.body), nullptr, state, impulses);
+  EXPECT_GT(impulses.internal_nodes.norm(), 0);
+  const Eigen::VectorXd ones = passive(scene.body);
+  const long before = allocations;
+  for (int k = 0; k < 12; ++k) stepper->step(kDt, ones, nullptr, state, impulses);
+  EXPECT_EQ(allocations - before, 0);
+}
+
 TYPED_TEST(Steppers, SayThatTheyDivergedAndLeaveTheStartState) {
   constexpr int Dim = TypeParam::kDim;
   const BodyOf<Dim> body = random_body<Dim>(2);

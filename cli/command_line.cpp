@@ -58,6 +58,7 @@ std::shared_ptr<CLI::App> command_line(int& exit_code) {
   add_simulate(*app, exit_code);
   add_signals(*app, exit_code);
   add_batch(*app, exit_code);
+  add_bench(*app, exit_code);
   return app;
 }
 

@@ -150,17 +150,18 @@ int tell(const SimulateCommand& command, const retarget::RunReport& report) {
 int simulate(const SimulateCommand& command) {
   Progress progress(std::cerr, progress_style(command.quiet));
   Stages stages(progress);
-  const io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
+  io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
   const retarget::SimulationOptions options = options_of(command, scene);
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   retarget::RunReport report;
   const retarget::Simulation simulation = std::visit(
-      [&](const auto& scenario) {
+      [&](auto& scenario) {
         const auto& body = scenario.scene.body;
         refuse_large_trace(command, options, body.node_count(), body.edge_count());
         // A second thread measures the error meanwhile; without one it is done when it is asked for.
         std::future<double> error = std::async(command.threads > 1 ? std::launch::async : std::launch::deferred,
-                                               [&] { return retarget::substep_error(scenario, options); });
+                                               [alone = scenario, &options] { return retarget::substep_error(alone, options); });
+        scenario.scene.threads = std::max(1, command.threads - 1);
         retarget::Simulation run = stages.run("simulation", [&] { return retarget::simulate(scenario, options); });
         stages.run("measurement", [&] {
           fill_report(scene, scenario, options, report);

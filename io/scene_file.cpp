@@ -298,8 +298,12 @@ std::optional<physics::Method> method_named(const std::string& name) {
   return physics::method_named(name);
 }
 
-SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed) {
-  const toml::table table = parse_toml(file);
+SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed, std::optional<int> nodes) {
+  toml::table table = parse_toml(file);
+  if (toml::table* const body = table["body"].as_table(); body != nullptr && nodes) {
+    body->erase("cell_size_m");
+    body->insert_or_assign("nodes", *nodes);
+  }
   const TomlReader root(table, file, "");
   for (const char* key : {"dimension", "dt_s", "duration_s", "seed", "method", "gravity_m_s2", "body", "material", "region", "ground",
                           "obstacle", "clamp", "activation", "push", "effects"}) {

@@ -17,7 +17,8 @@ ElementParts<Dim>::ElementParts(const ElementBlock<Dim>& block)
   for (int k = 0; k < count; ++k) {
     Part& part = parts_[static_cast<std::size_t>(k)];
     part.range = {block.batch_count() * k / count, block.batch_count() * (k + 1) / count};
-    part.lane_nodes.assign(block.lane_nodes.begin() + part.range.first * per_batch, block.lane_nodes.begin() + part.range.end * per_batch);
+    part.lane_nodes.assign(block.lane_nodes.begin() + part.range.first * per_batch,
+                           block.lane_nodes.begin() + part.range.end * per_batch);
     const auto [least, greatest] = std::minmax_element(part.lane_nodes.begin(), part.lane_nodes.end());
     part.first_node = *least;
     part.force.setZero(Dim, *greatest - *least + 1);
@@ -26,8 +27,8 @@ ElementParts<Dim>::ElementParts(const ElementBlock<Dim>& block)
 }
 
 template <int Dim>
-double ElementParts<Dim>::energy(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
-                                 WorkerTeam& team) {
+double ElementParts<Dim>::energy(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x,
+                                 const ActiveStrain<Dim>* active, WorkerTeam& team) {
   team.share(static_cast<int>(parts_.size()), [&](int k) {
     Part& part = parts_[static_cast<std::size_t>(k)];
     part.energy = element_energy<Dim>(block, x, active, part.range);
@@ -43,7 +44,8 @@ void ElementParts<Dim>::add_forces(const ElementBlock<Dim>& block, const ConstNo
   team.share(static_cast<int>(parts_.size()), [&](int k) {
     Part& part = parts_[static_cast<std::size_t>(k)];
     part.force.setZero();
-    add_element_forces<Dim>(block, part.lane_nodes, x.middleCols(part.first_node, part.force.cols()), active, part.range, part.force);
+    add_element_forces<Dim>(block, part.lane_nodes, x.middleCols(part.first_node, part.force.cols()), active, part.range,
+                            part.force);
   });
   team.share(static_cast<int>(parts_.size()), [&](int k) { add_up(k, force); });
 }

@@ -5,8 +5,8 @@
 
 namespace hydrostat::physics {
 
-/// The elements of a large block in parts that threads share. A part adds up the forces on its nodes apart from the others; then
-/// parts are added in their order. Number and limits of the parts follow from the block alone, and so do all sums: the
+/// The elements of a large block in parts that threads share. A part adds up the forces on its nodes apart from the others;
+/// then parts are added in their order. Number and limits of the parts follow from the block alone, and so do all sums: the
 /// threads change nothing in them.
 template <int Dim>
 class ElementParts {
@@ -14,7 +14,8 @@ class ElementParts {
   explicit ElementParts(const ElementBlock<Dim>& block);
 
   /// As element_energy and add_element_forces of the whole block, which is the one of the constructor.
-  double energy(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active, WorkerTeam& team);
+  double energy(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
+                WorkerTeam& team);
   void add_forces(const ElementBlock<Dim>& block, const ConstNodeMatrix<Dim>& x, const ActiveStrain<Dim>* active,
                   WorkerTeam& team, NodeMatrix<Dim>& force);
 

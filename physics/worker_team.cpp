@@ -4,7 +4,18 @@ namespace hydrostat::physics {
 namespace {
 
 constexpr std::uint64_t kOneRound = std::uint64_t{1} << 32;
-constexpr int kLooks = 200;  // of a helper for the next round, before it sleeps
+constexpr int kLooks = 1000;  // for what others do, before sleeping: some ten microseconds, about what waking takes
+
+/// Looks at a value for a while, then sleeps, until it is another than `old`.
+void wait_for_change(const std::atomic<int>& value, int old) {
+  for (int look = 0; look < kLooks; ++look) {
+    if (value.load(std::memory_order_acquire) != old) return;
+#ifdef __x86_64__
+    __builtin_ia32_pause();
+#endif
+  }
+  value.wait(old, std::memory_order_acquire);
+}
 
 }  // namespace
 
@@ -32,7 +43,9 @@ void WorkerTeam::run(int parts, Call call, const void* work) {
   round_.fetch_add(1, std::memory_order_release);
   round_.notify_all();
   help();
-  while (undone_.load(std::memory_order_acquire) > 0) std::this_thread::yield();
+  for (int undone = undone_.load(std::memory_order_acquire); undone > 0; undone = undone_.load(std::memory_order_acquire)) {
+    wait_for_change(undone_, undone);
+  }
 }
 
 void WorkerTeam::help() {
@@ -42,22 +55,17 @@ void WorkerTeam::help() {
     const void* const work = work_.load(std::memory_order_relaxed);
     if (!ticket_.compare_exchange_weak(ticket, ticket - 1, std::memory_order_acq_rel, std::memory_order_acquire)) continue;
     call(work, static_cast<int>(ticket % kOneRound) - 1);
-    undone_.fetch_sub(1, std::memory_order_acq_rel);
+    if (undone_.fetch_sub(1, std::memory_order_acq_rel) == 1) undone_.notify_one();
     ticket = ticket_.load(std::memory_order_acquire);
   }
 }
 
 void WorkerTeam::wait_and_help() {
-  int seen = 0;
-  while (!is_over_.load()) {
+  for (;;) {
+    const int round = round_.load();  // before the look whether all is over: the end is a round, too
+    if (is_over_.load()) return;
     help();
-    int round = round_.load(std::memory_order_acquire);
-    for (int look = 0; round == seen && look < kLooks; ++look) {
-      std::this_thread::yield();
-      round = round_.load(std::memory_order_acquire);
-    }
-    if (round == seen) round_.wait(seen);
-    seen = round_.load(std::memory_order_acquire);
+    wait_for_change(round_, round);
   }
 }
 

@@ -17,11 +17,12 @@ class WorkerTeam {
   WorkerTeam(const WorkerTeam&) = delete;
   WorkerTeam& operator=(const WorkerTeam&) = delete;
 
-  /// Calls work(part) once for each part from 0 to `parts` - 1, side by side, and returns when all are done. Allocates nothing;
-  /// `work` must not throw.
+  /// Calls work(part) once for each part from 0 to `parts` - 1, side by side, and returns when all are done. Allocates
+  /// nothing; `work` must not throw.
   template <class Work>
   void share(int parts, const Work& work) {
-    run(parts, [](const void* of, int part) { (*static_cast<const Work*>(of))(part); }, &work);
+    run(
+        parts, [](const void* of, int part) { (*static_cast<const Work*>(of))(part); }, &work);
   }
 
  private:

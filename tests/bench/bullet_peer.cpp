@@ -24,10 +24,11 @@ class BulletWorld {
  public:
   explicit BulletWorld(const BulletScene& scene)
       : dispatcher_(&configuration_),
-        world_(&dispatcher_, &broadphase_, (constraints_.setDeformableSolver(&solver_), &constraints_), &configuration_, &solver_),
+        world_(&dispatcher_, &broadphase_, (constraints_.setDeformableSolver(&solver_), &constraints_), &configuration_,
+               &solver_),
         gravity_(btVector3(0, btScalar(scene.gravity), 0)),
-        // The constants of the paper's energy, which Bullet takes without turning Lamé's into them (Smith, de Goes, Kim 2018,
-        // section 3.4). No damping: the default is heavy.
+        // The constants of the paper's energy, which Bullet takes without turning Lamé's into them (Smith, de Goes, Kim
+        // 2018, section 3.4). No damping: the default is heavy.
         elasticity_(btScalar(scene.mu * 4 / 3), btScalar(scene.lambda + scene.mu * 5 / 6), 0) {
     world_.setImplicit(scene.implicit != 0);
     world_.setLineSearch(false);

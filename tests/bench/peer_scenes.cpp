@@ -77,7 +77,8 @@ Verdict judge(const PeerScene& scene, const Motion& motion, const Motion& refere
     if (!(least >= verdict.least_jacobian)) verdict.least_jacobian = least;
     const double off = volume_off(state);
     if (!(off <= verdict.volume_error)) verdict.volume_error = off;
-    if (k + 1 == motion.frames.size()) verdict.is_sound = motion.is_whole && least > 0 && off < volume_off(motion.frames.front()) + 0.02;
+    if (k + 1 == motion.frames.size())
+      verdict.is_sound = motion.is_whole && least > 0 && off < volume_off(motion.frames.front()) + 0.02;
   }
   verdict.error = std::sqrt(sum / static_cast<double>(motion.frames.size()));
   if (body.held.empty()) {

@@ -34,11 +34,11 @@ Motion run(physics::Stepper& stepper, const PeerScene& scene, int steps_per_seco
 
 /// What a motion is worth.
 struct Verdict {
-  double error = 0;               // [m] root of the mean square of the distance of nodes from the reference, over all frames
-  double least_jacobian = 1;      // [-] in any frame
-  double volume_error = 0;        // [-] of the whole body, the most in any frame
-  double angular_loss = 0;        // [-] change of angular momentum about the COM over that of the start; 0 for held bodies
-  bool is_sound = true;           // whole, at the end no inverted tet and a volume no farther off than the start's by 2 %
+  double error = 0;           // [m] root of the mean square of the distance of nodes from the reference, over all frames
+  double least_jacobian = 1;  // [-] in any frame
+  double volume_error = 0;    // [-] of the whole body, the most in any frame
+  double angular_loss = 0;    // [-] change of angular momentum about the COM over that of the start; 0 for held bodies
+  bool is_sound = true;       // whole, at the end no inverted tet and a volume no farther off than the start's by 2 %
 };
 Verdict judge(const PeerScene& scene, const Motion& motion, const Motion& reference);
 

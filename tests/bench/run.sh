@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The benchmarks of physics, on one thread, in processor time:
-#   tests/bench/run.sh [peers] [-o DIR] [--sizes 1|2|3] [options of Google Benchmark]
+#   tests/bench/run.sh [peers] [-o DIR] [--tets 192,1152,5184] [options of Google Benchmark]
 # our methods and Bullet's deformable body on the same meshes; exit code 1 if a goal is missed. All three sizes take ten minutes.
 #   tests/bench/run.sh damping [-o DIR]
 # explicit and implicit over damping and stiffness.

@@ -25,13 +25,15 @@ double settled_sag(const Scene& scene) {
   Impulses impulses = make_impulses(scene);
   State state{scene.body.rest, Eigen::Matrix3Xd::Zero(3, scene.body.node_count())};
   const int tip = tip_of(scene.body);
-  for (int k = 0; k < 40; ++k) EXPECT_EQ(stepper->step(0.1, passive(scene.body), nullptr, state, impulses), Termination::kDone);
+  for (int k = 0; k < 40; ++k)
+    EXPECT_EQ(stepper->step(0.1, passive(scene.body), nullptr, state, impulses), Termination::kDone);
   return scene.body.rest(1, tip) - state.x(1, tip);
 }
 
 bool has_calculix() { return std::system("command -v ccx > /dev/null 2>&1") == 0; }
 
-/// What CalculiX finds for the same nodes, elements and held nodes under their weight [m]. Its hexahedra go round their faces.
+/// What CalculiX finds for the same nodes, elements and held nodes under their weight [m]. Its hexahedra go round their
+/// faces.
 double calculix_sag(const Scene& scene, const std::string& element, double poissons_ratio) {
   const TemporaryDirectory directory;
   const Body& body = scene.body;
@@ -52,8 +54,10 @@ double calculix_sag(const Scene& scene, const std::string& element, double poiss
     }
     file << "*NSET,NSET=TIP\n" << tip_of(body) + 1 << "\n*BOUNDARY\n";
     for (const int node : body.held) file << node + 1 << ",1,3\n";
-    file << "*MATERIAL,NAME=STUFF\n*ELASTIC\n" << kStiff << ',' << poissons_ratio << "\n*DENSITY\n1000\n"
-         << "*SOLID SECTION,ELSET=BAR,MATERIAL=STUFF\n*STEP\n*STATIC\n*DLOAD\nBAR,GRAV,9.81,0,-1,0\n*NODE PRINT,NSET=TIP\nU\n*END STEP\n";
+    file << "*MATERIAL,NAME=STUFF\n*ELASTIC\n"
+         << kStiff << ',' << poissons_ratio << "\n*DENSITY\n1000\n"
+         << "*SOLID SECTION,ELSET=BAR,MATERIAL=STUFF\n*STEP\n*STATIC\n*DLOAD\nBAR,GRAV,9.81,0,-1,0\n*NODE "
+            "PRINT,NSET=TIP\nU\n*END STEP\n";
   }
   const std::string command = "cd '" + directory.path.string() + "' && OMP_NUM_THREADS=1 ccx bar > log 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0);

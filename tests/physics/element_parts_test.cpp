@@ -21,7 +21,8 @@ TEST(WorkerTeam, DoesEveryPartOfEveryRoundOnce) {
       const int parts = round % 10;
       team.share(parts, [&](int part) { ++count[static_cast<std::size_t>(part)]; });
       for (int part = 0; part < 9; ++part) {
-        ASSERT_EQ(count[static_cast<std::size_t>(part)].exchange(0), part < parts ? 1 : 0) << "round " << round << ", part " << part;
+        ASSERT_EQ(count[static_cast<std::size_t>(part)].exchange(0), part < parts ? 1 : 0)
+            << "round " << round << ", part " << part;
       }
     }
   }

@@ -1,0 +1,63 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "io/scaling_page.h"
+#include "tests/cli/run_program.h"
+
+namespace hydrostat::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Bench, ScalingTellsTheCostOfEverySizeInTableAndPage) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = hydrostat_in(directory.path, "bench scaling - -o out --largest 500 --json --quiet");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["schema"], "hydrostat.scaling/1");
+  ASSERT_EQ(json["rows"].size(), 2U);
+  EXPECT_GT(json["rows"][1]["elements"], json["rows"][0]["elements"]);
+  for (const auto& row : json["rows"]) {
+    EXPECT_TRUE(row["whole"]);
+    for (const char* key : {"cpu_ns", "one_thread_ns", "shared_ns", "bytes", "substeps_per_s"})
+      EXPECT_GT(row[key], 0) << key;
+    // Slower than any limit of the machine, were it ever so loaded, and not by three orders.
+    EXPECT_GT(row["cpu_ns"], row["arithmetic_limit_ns"]);
+    EXPECT_LT(row["cpu_ns"], 1000 * row["arithmetic_limit_ns"].get<double>());
+  }
+  const std::string csv = io::read_file(directory.path / "out" / "scaling.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
+  EXPECT_NE(io::read_file(directory.path / "out" / "scaling.html").find("<svg"), std::string::npos);
+  EXPECT_TRUE(fs::exists(directory.path / "out" / "scene.toml"));  // what '-' stands for
+}
+
+TEST(Bench, ScalingRefusesWhatItCannotRead) {
+  const TemporaryDirectory directory;
+  EXPECT_EQ(hydrostat_in(directory.path, "bench scaling missing.toml -o out --quiet").exit_code, 1);
+  EXPECT_EQ(hydrostat_in(directory.path, "bench scaling - -o out --threads 1").exit_code, 2);
+  EXPECT_EQ(hydrostat_in(directory.path, "bench").exit_code, 2);
+}
+
+TEST(GrowthExponent, IsThePowerThatTimesFollow) {
+  for (const double power : {0.0, 1.0, 1.5}) {
+    std::vector<retarget::ScalingRow> rows;
+    for (const int elements : {200, 1000, 7000}) {
+      retarget::ScalingRow row;
+      row.elements = elements;
+      row.cpu_ns = 30 * std::pow(elements, power - 1);
+      rows.push_back(row);
+    }
+    rows.push_back(rows.back());
+    rows.back().cpu_ns = 1e9;
+    rows.back().is_whole = false;  // does not count
+    EXPECT_NEAR(retarget::growth_exponent(rows), power, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::cli

@@ -67,7 +67,7 @@ TEST(ReportJson, HasEveryGroupAndNameOfTheContract) {
         "correction_rms",
         "real_time_factor"}},
       {"/effects/0", {"name", "state", "reason", "ms_per_sim_s"}},
-      {"/accuracy", {"method", "element", "dt_s", "estimated_error_length"}},
+      {"/accuracy", {"method", "element", "material", "dt_s", "estimated_error_length"}},
       {"/timing_s", {"import", "body", "total"}},
   };
   for (const auto& [place, names] : contract) {

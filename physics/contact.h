@@ -54,7 +54,7 @@ struct ContactOf {
   int node_count, point_count;
   std::array<int, kMostNodes> nodes;
   std::array<double, kMostNodes> weights;
-  std::array<int, Dim> points;     // contact points that share what it bears; none of what it bears against itself
+  std::array<int, Dim> points;     // contact points that share what it bears; against itself the edge that it crosses
   std::array<double, Dim> shares;  // sum 1
   double inverse_mass;             // [1/kg] that an impulse meets; 0 where all nodes are held
   VectorOf<Dim> normal;            // away from the surface

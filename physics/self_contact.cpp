@@ -346,7 +346,8 @@ void SelfContactSet<Dim>::face_node(const PointsOf<Dim>& x, ContactOf<Dim>& cont
     if (along < 0) {
       Eigen::Matrix<double, Dim + 1, 1> inside;
       if (!coordinates_in<Dim>(x, scene_.body.tets.col(owner.tet).data(), point, inside)) continue;
-      if (inside[owner.opposite] > kDeepest || inside.minCoeff() < -kBeside) continue;
+      const bool is_in_tet = inside.minCoeff() >= 0;
+      if (!is_in_tet && (inside[owner.opposite] > kDeepest || inside.minCoeff() < -kBeside)) continue;
     }
     nearest = distance;
     along_nearest = std::abs(along);

@@ -221,8 +221,10 @@ TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
   Eigen::VectorXd curled = passive(scene.body);
   for (int e = 0; e < scene.body.edge_count(); ++e) {
     const VectorOf<Dim> span = scene.body.rest.col(scene.body.edges(1, e)) - scene.body.rest.col(scene.body.edges(0, e));
+    // More at one end than at the other: a spiral, whose head meets the side.
+    const double place = scene.body.rest(0, scene.body.edges(0, e)) / (20 * kCell);
     const double height = (scene.body.rest(1, scene.body.edges(0, e)) + scene.body.rest(1, scene.body.edges(1, e))) / 2;
-    curled[e] += 0.5 * (height / kCell - 1) * std::pow(span.normalized().x(), 2);
+    curled[e] += (0.65 - 0.3 * place) * (height / kCell - 1) * std::pow(span.normalized().x(), 2);
   }
   for (const bool on : {true, false}) {
     SCOPED_TRACE(on ? "on" : "off");
@@ -246,7 +248,7 @@ TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
     if (kSanitized) continue;  // the rest is of the end
     if (on) {
       EXPECT_GT(touched, 0);
-      EXPECT_LT(deepest, 0.02 * size_of(scene.body));
+      EXPECT_LT(deepest, (is_draft(kMethod) ? 0.05 : 0.02) * size_of(scene.body));
     } else {
       EXPECT_GT(deepest, 0.05 * size_of(scene.body));  // it would go through itself
     }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The benchmarks of physics, on one thread, in processor time:
 #   tests/bench/run.sh [peers] [-o DIR] [--tets 192,1152,5184] [options of Google Benchmark]
-# our methods and Bullet's deformable body on the same meshes; exit code 1 if a goal is missed. All three sizes take ten minutes.
+# our methods and Bullet's deformable body on the same meshes; exit code 1 if a goal is missed. All three sizes take a quarter of an hour.
 #   tests/bench/run.sh damping [-o DIR]
 # explicit and implicit over damping and stiffness.
 # Installs what is missing, builds, prints a table in markdown and writes it to DIR (default: out/peers/peers.csv,

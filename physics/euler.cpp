@@ -103,7 +103,7 @@ class EulerStepper final : public StepperOf<Dim> {
       follow_places(dt, state, impulses);
       ++unsolved_;
     }
-    if ((!is_solved && !has_moved) || !state.v.allFinite() || !state.x.allFinite()) {
+    if ((!is_solved && !has_moved) || !std::isfinite(state.v.squaredNorm()) || !state.x.allFinite()) {
       state = start_;
       return Termination::kDiverged;
     }

@@ -79,6 +79,7 @@ class RecoveringStepper<Dim>::Recovery {
         outside_(without_self_contact(scene)),
         forces_(scene.body),
         contact_(outside_),
+        start_{scene.body.rest, scene.body.rest},
         arms_(scene.body.rest),
         whole_volume_(scene.body.rest_volume.sum()),
         size_(size_of_volume<Dim>(whole_volume_)) {
@@ -131,6 +132,7 @@ class RecoveringStepper<Dim>::Recovery {
     if (!forces_.set_activation(activation)) return Termination::kDiverged;  // which the method would not take either
     const BodyOf<Dim>& body = scene_.body;
     for (std::size_t n = 0; n < outside_.obstacles.size(); ++n) outside_.obstacles[n].velocity = scene_.obstacles[n].velocity;
+    start_ = state;
     since_s_ += dt;
     fit(state);
     clear(impulses);
@@ -151,7 +153,10 @@ class RecoveringStepper<Dim>::Recovery {
       fastest = std::max(fastest, state.v.col(i).norm());
     }
     if (effect_force != nullptr) impulses.effect_nodes = dt * *effect_force;
-    if (!state.v.allFinite()) return Termination::kDiverged;
+    if (!std::isfinite(state.v.squaredNorm())) {
+      state = start_;
+      return Termination::kDiverged;
+    }
     if (contact_.is_needed()) contact_.push_apart(dt, fastest, state, impulses);
     state.x += dt * state.v;
     return Termination::kDone;
@@ -222,6 +227,7 @@ class RecoveringStepper<Dim>::Recovery {
   ImpulseContact<Dim> contact_;
   std::vector<int> piece_of_;  // N
   std::vector<Piece> pieces_;
+  StateOf<Dim> start_;  // of the step
   PointsOf<Dim> arms_;  // [m] of the nodes from their pieces' centres
   double whole_volume_, size_;
   double frequency_ = 0, since_s_ = 0;  // [1/s] of the oscillators; [s] since the beginning

@@ -21,7 +21,7 @@ struct Performer {
   Motion clip_skin;        // all of the skin likewise, thinned for the eye, 3V x F
   double clip_rise = 0;    // [m] of the centre of mass of the clip's nodes, over its height at the start
   double length = 1, size = 1;  // L and D [m]
-  std::string self_contact_reason;  // why the scene has it or not
+  std::string self_contact_reason = "nobody asked for it";  // why the scene has it or not
 };
 
 /// Which free runs are wanted, and how.

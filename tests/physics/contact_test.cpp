@@ -55,17 +55,16 @@ StateOf<Dim> laid_on(const SceneOf<Dim>& scene, double gap) {
 template <int Dim>
 void look_at_nothing(const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>&) {}
 
-TYPED_TEST(Contact, HoldsABlockOnASlopeOfAnyKindWithinTheCone) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, HoldsABlockOnASlopeOfAnyKindWithinTheCone) {
   for (const Slope kind : kSlopes) {
-    if (is_draft(TypeParam::kMethod) && kind != Slope::kHalfSpace) continue;  // contact is the explicit method's
+    if (is_draft(method) && kind != Slope::kHalfSpace) continue;  // contact is the explicit method's
     SCOPED_TRACE(static_cast<int>(kind));
     const SceneOf<Dim> scene = on_slope(bar<Dim>(4, 2, 2, 0.1), kind, 20, 0.5);
     VectorOf<Dim> settled = VectorOf<Dim>::Zero();
     int steps = 0;
     double residual = 0;
     const StateOf<Dim> end =
-        simulate<Dim>(TypeParam::kMethod, scene, laid_on(scene, 0), kDt, 480,
+        simulate<Dim>(method, scene, laid_on(scene, 0), kDt, 480,
                       [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
                         if (++steps == 240) settled = centre_of_mass(scene.body, after.x);
                         residual = std::max(residual, momentum_residual(scene, before, after, impulses, kDt));
@@ -76,17 +75,16 @@ TYPED_TEST(Contact, HoldsABlockOnASlopeOfAnyKindWithinTheCone) {
   }
 }
 
-TYPED_TEST(Contact, LetsABlockSlideDownASlopeOfAnyKindBeyondTheCone) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, LetsABlockSlideDownASlopeOfAnyKindBeyondTheCone) {
   for (const Slope kind : kSlopes) {
-    if (is_draft(TypeParam::kMethod) && kind != Slope::kHalfSpace) continue;  // contact is the explicit method's
+    if (is_draft(method) && kind != Slope::kHalfSpace) continue;  // contact is the explicit method's
     SCOPED_TRACE(static_cast<int>(kind));
     const BodyOf<Dim> brick = bar<Dim>(6, 2, 4, 0.1);
     const SceneOf<Dim> scene = on_slope(brick, kind, 20, 0.3);
     const VectorOf<Dim> downhill = -scene.obstacles.front().turn.col(0);
     double speed = 0, faster = 0;
     int steps = 0;
-    simulate<Dim>(TypeParam::kMethod, scene, laid_on(scene, 0), kDt, 480,
+    simulate<Dim>(method, scene, laid_on(scene, 0), kDt, 480,
                   [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
                     const double along = downhill.dot(momentum(brick, after.v)) / brick.mass.sum();
                     if (++steps == 240) speed = along;
@@ -98,8 +96,7 @@ TYPED_TEST(Contact, LetsABlockSlideDownASlopeOfAnyKindBeyondTheCone) {
   }
 }
 
-TYPED_TEST(Contact, GivesEachObstacleItsOwnFriction) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, GivesEachObstacleItsOwnFriction) {
   // Rough to the left of the origin, without friction to the right: two blocks' worth of floor.
   const BodyOf<Dim> brick = bar<Dim>(4, 2, 2, 0.1);
   for (const bool starts_on_ice : {false, true}) {
@@ -116,15 +113,14 @@ TYPED_TEST(Contact, GivesEachObstacleItsOwnFriction) {
     StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
     state.x.row(0).array() += starts_on_ice ? 1 : -3;
     state.v.row(0).setConstant(1);
-    const StateOf<Dim> end = simulate<Dim>(TypeParam::kMethod, scene, state, kDt, 48, look_at_nothing<Dim>);
+    const StateOf<Dim> end = simulate<Dim>(method, scene, state, kDt, 48, look_at_nothing<Dim>);
     if (kSanitized) continue;  // the rest is of the end
     const double speed = momentum(brick, end.v).x() / brick.mass.sum();
     EXPECT_NEAR(speed, starts_on_ice ? 1 : 1 - 0.4 * kGravity * 0.2, starts_on_ice ? 1e-9 : 0.03);
   }
 }
 
-TYPED_TEST(Contact, RollsABallDownASlopeAsItsInertiaSays) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, RollsABallDownASlopeAsItsInertiaSays) {
   constexpr double kRadius = 0.25, kDegrees = 8;
   Material material;
   material.youngs_modulus = 1e6;
@@ -135,7 +131,7 @@ TYPED_TEST(Contact, RollsABallDownASlopeAsItsInertiaSays) {
   const VectorOf<Dim> downhill = -scene.obstacles.front().turn.col(0);
   double speed = 0, turns = 0, way = 0;
   int steps = 0;
-  simulate<Dim>(TypeParam::kMethod, scene, laid_on(scene, 0.0), kDt, 240,
+  simulate<Dim>(method, scene, laid_on(scene, 0.0), kDt, 240,
                 [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
                   speed = downhill.dot(momentum(body, after.v)) / mass;
                   if (++steps <= 80) return;
@@ -146,13 +142,12 @@ TYPED_TEST(Contact, RollsABallDownASlopeAsItsInertiaSays) {
   const double expected =
       kGravity * std::sin(kDegrees * 3.14159265358979323846 / 180) / (1 + turning_inertia / (mass * kRadius * kRadius));
   // After a second; the corners of the mesh take a little, of a softer ball more.
-  EXPECT_NEAR(speed / expected, 1, is_draft(TypeParam::kMethod) ? 0.15 : 0.05);
+  EXPECT_NEAR(speed / expected, 1, is_draft(method) ? 0.15 : 0.05);
   EXPECT_NEAR(turns * kRadius / way, 1, 0.03);  // it does not slip
 }
 
-TYPED_TEST(Contact, ThrowsAFallingBarBackAsItsWavesSay) {
-  constexpr int Dim = TypeParam::kDim;
-  if (TypeParam::kMethod == Method::kEuler) GTEST_SKIP() << "backward Euler damps the waves";
+METHOD_TEST(Contact, ThrowsAFallingBarBackAsItsWavesSay) {
+  if (method == Method::kEuler) GTEST_SKIP() << "backward Euler damps the waves";
   constexpr double kLength = 1.6, kSpeed = 0.1;
   Material material;
   material.damping_time = 0;
@@ -165,7 +160,7 @@ TYPED_TEST(Contact, ThrowsAFallingBarBackAsItsWavesSay) {
   const double wave_speed = std::sqrt(material.youngs_modulus / material.density);
   double touched = 0;
   const double dt = kLength / wave_speed / 100;
-  const StateOf<Dim> end = simulate<Dim>(TypeParam::kMethod, scene, state, dt, 400,
+  const StateOf<Dim> end = simulate<Dim>(method, scene, state, dt, 400,
                                          [&](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>& impulses) {
                                            if (impulses.contact.norm() > 0) touched += dt;
                                          });
@@ -176,8 +171,7 @@ TYPED_TEST(Contact, ThrowsAFallingBarBackAsItsWavesSay) {
   EXPECT_LE(back, 1);
 }
 
-TYPED_TEST(Contact, StopsAFallOnAnythingWithinTwoPercentOfTheBodysSize) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, StopsAFallOnAnythingWithinTwoPercentOfTheBodysSize) {
   for (int kind = 0; kind < 5; ++kind) {
     SCOPED_TRACE(kind);
     SceneOf<Dim> scene = scene_of(bar<Dim>(5, 3, 3, 0.1), {});
@@ -201,7 +195,7 @@ TYPED_TEST(Contact, StopsAFallOnAnythingWithinTwoPercentOfTheBodysSize) {
     double deepest = 0, residual = 0;
     int steps = 0;
     VectorOf<Dim> carried = VectorOf<Dim>::Zero();
-    simulate<Dim>(TypeParam::kMethod, scene, state, kDt, 120,
+    simulate<Dim>(method, scene, state, kDt, 120,
                   [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
                     if (++steps % 4 == 0) deepest = std::max(deepest, deepest_place(scene, after));
                     residual = std::max(residual, momentum_residual(scene, before, after, impulses, kDt));
@@ -214,8 +208,7 @@ TYPED_TEST(Contact, StopsAFallOnAnythingWithinTwoPercentOfTheBodysSize) {
   }
 }
 
-TYPED_TEST(Contact, BooksTheWorkOfAPlateThatLifts) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, BooksTheWorkOfAPlateThatLifts) {
   constexpr double kSpeed = 0.2;
   SceneOf<Dim> scene = scene_of(bar<Dim>(4, 2, 2, 0.1), {});
   scene.has_ground = false;
@@ -225,13 +218,13 @@ TYPED_TEST(Contact, BooksTheWorkOfAPlateThatLifts) {
   touch_with_whole_surface(scene);
   StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
   // Settle first, then lift for a second.
-  state = simulate<Dim>(TypeParam::kMethod, scene, state, kDt, 240, look_at_nothing<Dim>);
+  state = simulate<Dim>(method, scene, state, kDt, 240, look_at_nothing<Dim>);
   state.v.row(1).array() += kSpeed;
   scene.obstacles.front().velocity = vec<Dim>(0, kSpeed, 0);
   const double at_first = energy(scene, state, passive(scene.body));
   double work = 0;
   const StateOf<Dim> end = simulate<Dim>(
-      TypeParam::kMethod, scene, state, kDt, 240,
+      method, scene, state, kDt, 240,
       [&](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>& impulses) { work += impulses.obstacle_work; });
   if (kSanitized) return;  // the rest is of the end
   const double weight = scene.body.mass.sum() * kGravity;
@@ -240,8 +233,7 @@ TYPED_TEST(Contact, BooksTheWorkOfAPlateThatLifts) {
   EXPECT_NEAR(end.obstacle_travel(1, 0), kSpeed, 1e-12);
 }
 
-TYPED_TEST(Contact, CarriesABlockAlongOnAPlateThatMovesSideways) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, CarriesABlockAlongOnAPlateThatMovesSideways) {
   SceneOf<Dim> scene = scene_of(bar<Dim>(4, 2, 2, 0.1), {});
   scene.has_ground = false;
   scene.obstacles.resize(1);
@@ -251,7 +243,7 @@ TYPED_TEST(Contact, CarriesABlockAlongOnAPlateThatMovesSideways) {
   const StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
   double work = 0;
   const StateOf<Dim> end = simulate<Dim>(
-      TypeParam::kMethod, scene, state, kDt, 240,
+      method, scene, state, kDt, 240,
       [&](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>& impulses) { work += impulses.obstacle_work; });
   if (kSanitized) return;  // the rest is of the end
   const double mass = scene.body.mass.sum();
@@ -259,8 +251,7 @@ TYPED_TEST(Contact, CarriesABlockAlongOnAPlateThatMovesSideways) {
   EXPECT_NEAR(work / (mass * 0.5 * 0.5), 1, 0.03);  // half of it went into heat while it slipped
 }
 
-TYPED_TEST(Contact, LiftsABodyOutOfWhatItStartsInWithoutThrowingIt) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Contact, LiftsABodyOutOfWhatItStartsInWithoutThrowingIt) {
   for (const bool is_ball : {false, true}) {
     SceneOf<Dim> scene = scene_of(bar<Dim>(4, 3, 3, 0.1), {});
     scene.has_ground = false;
@@ -278,13 +269,13 @@ TYPED_TEST(Contact, LiftsABodyOutOfWhatItStartsInWithoutThrowingIt) {
     double work = 0, excess = -1e9, highest = 0;
     const double scale = scene.body.mass.sum() * kGravity * size_of(scene.body);
     const StateOf<Dim> end =
-        simulate<Dim>(TypeParam::kMethod, scene, state, kDt, 240,
+        simulate<Dim>(method, scene, state, kDt, 240,
                       [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
                         work += impulses.obstacle_work;
                         excess = std::max(excess, energy(scene, after, passive(scene.body)) - at_first - work);
                         highest = std::max(highest, centre_of_mass(scene.body, after.x).y() - height);
                       });
-    EXPECT_LT(excess, is_draft(TypeParam::kMethod) ? 0.2 * scale : 0.01 * scale);  // drafts leave some energy uncounted
+    EXPECT_LT(excess, is_draft(method) ? 0.2 * scale : 0.01 * scale);  // drafts leave some energy uncounted
     EXPECT_LT(highest, 0.1 + 0.1 * size_of(scene.body));
     if (kSanitized) continue;  // the rest is of the end
     EXPECT_LT(deepest_place(scene, end), 0.02 * size_of(scene.body));

@@ -41,7 +41,7 @@ TYPED_TEST(ElementBody, IsFilledByItsTetsAndHasEveryPairOfNodesAsAnEdge) {
 
 TYPED_TEST(ElementBody, TellsWhatItsElementsWereMadeFrom) {
   constexpr int Dim = TypeParam::kDim;
-  for_random_element_bodies<Dim>(2, [](const BodyOf<Dim>& body, std::mt19937& random) {
+  for_random_element_bodies<Dim>(2, [&](const BodyOf<Dim>& body, std::mt19937& random) {
     const BodyElements<Dim>& elements = body.elements.front();
     BodyOf<Dim> again = body;
     again.elements = {make_body_elements(mesh_of(body, elements), elements.block.law)};
@@ -59,11 +59,10 @@ template <typename Case>
 class ElementSteppers : public testing::Test {};
 TYPED_TEST_SUITE(ElementSteppers, Cases, CaseName);
 
-TYPED_TEST(ElementSteppers, KeepMomentumInFreeFlightWhateverTheActivation) {
-  constexpr int Dim = TypeParam::kDim;
-  for_random_element_bodies<Dim>(2, [](const BodyOf<Dim>& body, std::mt19937& random) {
+METHOD_TEST(ElementSteppers, KeepMomentumInFreeFlightWhateverTheActivation) {
+  for_random_element_bodies<Dim>(2, [&](const BodyOf<Dim>& body, std::mt19937& random) {
     const SceneOf<Dim> scene = in_the_air(body, true);
-    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
     ImpulsesOf<Dim> impulses = make_impulses(scene);
     StateOf<Dim> state{body.rest, random_points<Dim>(random, body.node_count(), 0.2)};
     const VectorOf<Dim> from = momentum(body, state.v);
@@ -74,18 +73,17 @@ TYPED_TEST(ElementSteppers, KeepMomentumInFreeFlightWhateverTheActivation) {
       ASSERT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone);
       const SpinOf<Dim> turned = angular_momentum(body, state.x, state.v, VectorOf<Dim>::Zero()) - before;
       if (stepper->guard_steps() != guarded) continue;  // backward Euler's loss
-      EXPECT_LT((turned - impulses.gravity_moment).norm(), angular_tolerance(TypeParam::kMethod) * body.mass.sum());
+      EXPECT_LT((turned - impulses.gravity_moment).norm(), angular_tolerance(method) * body.mass.sum());
     }
     EXPECT_LT((momentum(body, state.v) - from - 24 * kDt * body.mass.sum() * scene.gravity).norm(), 1e-9 * body.mass.sum());
   });
 }
 
-TYPED_TEST(ElementSteppers, HoldACantileverAndBookWhatThatTakes) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(ElementSteppers, HoldACantileverAndBookWhatThatTakes) {
   SceneOf<Dim> scene = cantilever<Dim>(8, 2, Cut::kBoxes, {1000, 5e5, 0.4});
   BodyOf<Dim>& body = scene.body;
   body.edge_damping.setConstant(20);
-  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
   ImpulsesOf<Dim> impulses = make_impulses(scene);
   StateOf<Dim> state{body.rest, PointsOf<Dim>::Zero(Dim, body.node_count())};
   for (int k = 0; k < 60; ++k) {
@@ -98,14 +96,13 @@ TYPED_TEST(ElementSteppers, HoldACantileverAndBookWhatThatTakes) {
   EXPECT_LT(state.x.row(1).minCoeff(), -0.01);  // it falls at its end
 }
 
-TYPED_TEST(ElementSteppers, ContractAsTheyAreAskedTo) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(ElementSteppers, ContractAsTheyAreAskedTo) {
   // All lengths a tenth shorter is a shape that elements have without stress.
   for (const Cut cut : cuts<Dim>()) {
     BodyOf<Dim> body = make_body(element_bar<Dim>(Eigen::Matrix<int, Dim, 1>::Constant(2), VectorOf<Dim>::Constant(0.2), cut),
                                  {ElasticLaw::kStableNeoHookean, 0, 0.005});
     const SceneOf<Dim> scene = in_the_air(std::move(body), false);
-    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
     ImpulsesOf<Dim> impulses = make_impulses(scene);
     StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
     for (int k = 0; k < 48; ++k) {

@@ -23,8 +23,7 @@ std::unique_ptr<StepperOf<Dim>> make_bare(Method method, const SceneOf<Dim>& sce
   return method == Method::kExplicit ? make_explicit_stepper(scene) : make_implicit_stepper(scene);
 }
 
-TYPED_TEST(Guard, LeavesSoundStepsAsTheyAreToTheBit) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Guard, LeavesSoundStepsAsTheyAreToTheBit) {
   const SceneOf<Dim> scene = scene_of(four_legged<Dim>(), soles(four_legged<Dim>()), slope<Dim>(10, 0.4));
   const auto run = [&](StepperOf<Dim>& stepper) {
     ImpulsesOf<Dim> impulses = make_impulses(scene);
@@ -37,15 +36,14 @@ TYPED_TEST(Guard, LeavesSoundStepsAsTheyAreToTheBit) {
     }
     return state;
   };
-  const std::unique_ptr<StepperOf<Dim>> guarded = make_stepper(TypeParam::kMethod, scene);
-  const StateOf<Dim> with = run(*guarded), without = run(*make_bare(TypeParam::kMethod, scene));
+  const std::unique_ptr<StepperOf<Dim>> guarded = make_stepper(method, scene);
+  const StateOf<Dim> with = run(*guarded), without = run(*make_bare(method, scene));
   EXPECT_EQ(with.x, without.x);
   EXPECT_EQ(with.v, without.v);
   EXPECT_EQ(guarded->guard_steps(), 0);
 }
 
-TYPED_TEST(Guard, FindsBackFromRandomCollapsedAndFlattenedStarts) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Guard, FindsBackFromRandomCollapsedAndFlattenedStarts) {
   const Cut cut = Dim == 2 ? Cut::kTwoTriangles : Cut::kSixTets;
   SceneOf<Dim> scene = cantilever<Dim>(Dim == 2 ? 8 : 4, Dim == 2 ? 2 : 1, cut, {1000, 5e5, 0.4});
   scene.body.held.clear();
@@ -58,7 +56,7 @@ TYPED_TEST(Guard, FindsBackFromRandomCollapsedAndFlattenedStarts) {
     const PointsOf<Dim> starts[] = {random_points<Dim>(random, nodes, 0.5), random_points<Dim>(random, nodes, 0.0005), flat};
     for (int kind = 0; kind < 3; ++kind) {
       SCOPED_TRACE("start " + std::to_string(kind) + ", seed " + std::to_string(seed));
-      const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+      const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
       ImpulsesOf<Dim> impulses = make_impulses(scene);
       StateOf<Dim> state{starts[kind], PointsOf<Dim>::Zero(Dim, nodes)};
       for (int k = 0; k < 240; ++k) {
@@ -89,8 +87,7 @@ class Spoilt final : public StepperOf<Dim> {
   std::function<Termination(StateOf<Dim>&)> spoil_;
 };
 
-TYPED_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
   const BodyOf<Dim> body = four_legged<Dim>();
   const SceneOf<Dim> scene = scene_of(body, soles(body));
   const std::function<Termination(StateOf<Dim>&)> spoils[] = {

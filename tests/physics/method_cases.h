@@ -24,6 +24,16 @@ using PlaneCases = testing::Types<Case<2, Method::kExplicit>, Case<2, Method::kI
 using AllCases = testing::Types<Case<2, Method::kExplicit>, Case<3, Method::kExplicit>, Case<2, Method::kImplicit>,
                                 Case<3, Method::kImplicit>, Case<2, Method::kEuler>, Case<3, Method::kEuler>,
                                 Case<2, Method::kXpbd>, Case<3, Method::kXpbd>, Case<2, Method::kSpring>, Case<3, Method::kSpring>>;
+/// A typed test on Case types whose body, a function of `Dim` and `method`, is compiled once a dimension, not once a case.
+#define METHOD_TEST(Suite, Name)                                       \
+  template <int Dim>                                                   \
+  void Suite##Name(Method method);                                     \
+  TYPED_TEST(Suite, Name) {                                            \
+    Suite##Name<TypeParam::kDim>(TypeParam::kMethod);                  \
+  }                                                                    \
+  template <int Dim>                                                   \
+  void Suite##Name([[maybe_unused]] Method method)
+
 /// Every method in both dimensions; with sanitizers in the plane, from the same sources.
 using Cases = std::conditional_t<kSanitized, PlaneCases, AllCases>;
 

@@ -102,9 +102,7 @@ using SelfContactCases =
                                       Case<3, Method::kImplicit>, Case<3, Method::kEuler>>>;
 TYPED_TEST_SUITE(SelfContacts, SelfContactCases, CaseName);
 
-TYPED_TEST(SelfContacts, LetTwoBlocksCollideWithoutAnyOneOutsideKnowing) {
-  constexpr int Dim = TypeParam::kDim;
-  constexpr Method kMethod = TypeParam::kMethod;
+METHOD_TEST(SelfContacts, LetTwoBlocksCollideWithoutAnyOneOutsideKnowing) {
   for (unsigned seed = 0; seed < trials(3u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
@@ -121,11 +119,11 @@ TYPED_TEST(SelfContacts, LetTwoBlocksCollideWithoutAnyOneOutsideKnowing) {
     double touched = 0, deepest = 0;
     int steps = 0;
     const StateOf<Dim> end =
-        simulate(kMethod, scene, start, kDt, 120,
+        simulate(method, scene, start, kDt, 120,
                  [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
                    EXPECT_LT((momentum(scene.body, after.v) - momentum(scene.body, before.v)).norm(),
-                             mass * linear_tolerance(kMethod));
-                   EXPECT_LT(unexplained_turn(scene, before, after, impulses), mass * angular_tolerance(kMethod));
+                             mass * linear_tolerance(method));
+                   EXPECT_LT(unexplained_turn(scene, before, after, impulses), mass * angular_tolerance(method));
                    EXPECT_EQ(impulses.contact_nodes.norm(), 0);
                    EXPECT_LT(impulses.internal_nodes.rowwise().sum().norm(), 1e-12 * mass);
                    touched += impulses.internal_nodes.norm();
@@ -168,9 +166,8 @@ double speed_of_second(const SceneOf<Dim>& scene, const StateOf<Dim>& state) {
   return momentum / mass;
 }
 
-TYPED_TEST(SelfContacts, HoldABlockOnABlockWithinTheConeAndLetItSlideBeyond) {
-  constexpr int Dim = TypeParam::kDim;
-  if (is_draft(TypeParam::kMethod)) GTEST_SKIP() << "a draft's friction is not to be trusted to a few percent";
+METHOD_TEST(SelfContacts, HoldABlockOnABlockWithinTheConeAndLetItSlideBeyond) {
+  if (is_draft(method)) GTEST_SKIP() << "a draft's friction is not to be trusted to a few percent";
   for (const double friction : {0.5, 0.3}) {
     SCOPED_TRACE(friction);
     SceneOf<Dim> scene = two_blocks<Dim>(true, {1000, 2e6, 4, 0.01});
@@ -178,7 +175,7 @@ TYPED_TEST(SelfContacts, HoldABlockOnABlockWithinTheConeAndLetItSlideBeyond) {
     const StateOf<Dim> start = piled(scene, 20, 0);
     double speed = 0, held = 0;
     int steps = 0;
-    const StateOf<Dim> end = simulate(TypeParam::kMethod, scene, start, kDt, 96,
+    const StateOf<Dim> end = simulate(method, scene, start, kDt, 96,
                                       [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
                                         if (++steps == 48) speed = speed_of_second(scene, after);
                                         if (steps > 48) held += impulses.hold.row(1).sum();
@@ -192,14 +189,13 @@ TYPED_TEST(SelfContacts, HoldABlockOnABlockWithinTheConeAndLetItSlideBeyond) {
   }
 }
 
-TYPED_TEST(SelfContacts, PushApartWhatOverlapsAtTheStartWithoutThrowingIt) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(SelfContacts, PushApartWhatOverlapsAtTheStartWithoutThrowingIt) {
   for (const double overlap : {0.1 * kCell, 0.3 * kCell}) {
     SCOPED_TRACE(overlap);
     SceneOf<Dim> scene = two_blocks<Dim>(true, {1000, 2e6, 4, 0.01});
     const StateOf<Dim> start = piled(scene, 0, overlap);
     double fastest = 0;
-    const StateOf<Dim> end = simulate(TypeParam::kMethod, scene, start, kDt, 240,
+    const StateOf<Dim> end = simulate(method, scene, start, kDt, 240,
                                       [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
                                         fastest = std::max(fastest, after.v.colwise().norm().maxCoeff());
                                       });
@@ -213,9 +209,7 @@ TYPED_TEST(SelfContacts, PushApartWhatOverlapsAtTheStartWithoutThrowingIt) {
   }
 }
 
-TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
-  constexpr int Dim = TypeParam::kDim;
-  constexpr Method kMethod = TypeParam::kMethod;
+METHOD_TEST(SelfContacts, StopABarThatCurlsUp) {
   SceneOf<Dim> scene = in_the_air(bar<Dim>(20, 2, 1, kCell, {1000, 2e5, 4, 0.01}), false);
   scene.self_contact.is_on = true;
   Eigen::VectorXd curled = passive(scene.body);
@@ -229,7 +223,7 @@ TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
   for (const bool on : {true, false}) {
     SCOPED_TRACE(on ? "on" : "off");
     scene.self_contact.is_on = on;
-    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(kMethod, scene);
+    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
     ImpulsesOf<Dim> impulses = make_impulses(scene);
     StateOf<Dim> state{scene.body.rest, PointsOf<Dim>::Zero(Dim, scene.body.node_count())};
     double touched = 0, deepest = 0;
@@ -238,9 +232,9 @@ TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
       const StateOf<Dim> before = state;
       const Eigen::VectorXd activation = passive(scene.body) + std::min(1.0, k / 200.0) * (curled - passive(scene.body));
       ASSERT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone) << k;
-      EXPECT_LT((momentum(scene.body, state.v) - momentum(scene.body, before.v)).norm(), mass * linear_tolerance(kMethod));
+      EXPECT_LT((momentum(scene.body, state.v) - momentum(scene.body, before.v)).norm(), mass * linear_tolerance(method));
       if (stepper->guard_steps() == 0) {
-        EXPECT_LT(unexplained_turn(scene, before, state, impulses), mass * angular_tolerance(kMethod));
+        EXPECT_LT(unexplained_turn(scene, before, state, impulses), mass * angular_tolerance(method));
       }
       touched += impulses.internal_nodes.norm();
       if (k % 16 == 0) deepest = std::max(deepest, deepest_inside_itself(scene.body, state.x));
@@ -248,7 +242,7 @@ TYPED_TEST(SelfContacts, StopABarThatCurlsUp) {
     if (kSanitized) continue;  // the rest is of the end
     if (on) {
       EXPECT_GT(touched, 0);
-      EXPECT_LT(deepest, (is_draft(kMethod) ? 0.05 : 0.02) * size_of(scene.body));
+      EXPECT_LT(deepest, (is_draft(method) ? 0.05 : 0.02) * size_of(scene.body));
     } else {
       EXPECT_GT(deepest, 0.05 * size_of(scene.body));  // it would go through itself
     }

@@ -41,46 +41,42 @@ double deepest(const SceneOf<Dim>& scene, const StateOf<Dim>& state) {
   return depth;
 }
 
+/// Runs `steps`, the first few with sanitizers, and gives each to `look(before, after, impulses)`.
+template <int Dim, typename Look>
+StateOf<Dim> run(Method method, const SceneOf<Dim>& scene, StateOf<Dim> state, int steps, const Look& look,
+                 double activation_amplitude = 0, unsigned seed = 0) {
+  std::mt19937 random(seed);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  Eigen::VectorXd activation = passive(scene.body);
+  for (int k = 0; k < few_steps(steps); ++k) {
+    if (activation_amplitude > 0 && k % 12 == 0) activation = random_activation(random, scene.body, activation_amplitude);
+    const StateOf<Dim> before = state;
+    EXPECT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone) << "step " << k;
+    look(before, state, impulses);
+  }
+  return state;
+}
+template <int Dim>
+StateOf<Dim> run(Method method, const SceneOf<Dim>& scene, StateOf<Dim> state, int steps) {
+  return run(method, scene, std::move(state), steps, [](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>&) {});
+}
+
 /// What every method has to keep in both dimensions, whatever the scene.
 template <typename Case>
-class Steppers : public testing::Test {
- protected:
-  /// Runs `steps`, the first few with sanitizers, and gives each to `look(before, after, impulses)`.
-  template <typename Look>
-  StateOf<Case::kDim> run(const SceneOf<Case::kDim>& scene, StateOf<Case::kDim> state, int steps, const Look& look,
-                          double activation_amplitude = 0, unsigned seed = 0) {
-    std::mt19937 random(seed);
-    const std::unique_ptr<StepperOf<Case::kDim>> stepper = make_stepper(Case::kMethod, scene);
-    ImpulsesOf<Case::kDim> impulses = make_impulses(scene);
-    Eigen::VectorXd activation = passive(scene.body);
-    for (int k = 0; k < few_steps(steps); ++k) {
-      if (activation_amplitude > 0 && k % 12 == 0) activation = random_activation(random, scene.body, activation_amplitude);
-      const StateOf<Case::kDim> before = state;
-      EXPECT_EQ(stepper->step(kDt, activation, nullptr, state, impulses), Termination::kDone) << "step " << k;
-      look(before, state, impulses);
-    }
-    return state;
-  }
-  StateOf<Case::kDim> run(const SceneOf<Case::kDim>& scene, StateOf<Case::kDim> state, int steps) {
-    return run(scene, std::move(state), steps,
-               [](const StateOf<Case::kDim>&, const StateOf<Case::kDim>&, const ImpulsesOf<Case::kDim>&) {});
-  }
-};
-
+class Steppers : public testing::Test {};
 TYPED_TEST_SUITE(Steppers, Cases, CaseName);
 
-TYPED_TEST(Steppers, StayAtRestInTheRestShape) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, StayAtRestInTheRestShape) {
   SceneOf<Dim> scene = scene_of(random_body<Dim>(4), {});
   scene.gravity.setZero();
   scene.has_ground = false;
-  const StateOf<Dim> end = this->run(scene, {scene.body.rest, 0 * scene.body.rest}, 24);
+  const StateOf<Dim> end = run<Dim>(method, scene, {scene.body.rest, 0 * scene.body.rest}, 24);
   EXPECT_LT((end.x - scene.body.rest).cwiseAbs().maxCoeff(), 1e-12);
 }
 
-TYPED_TEST(Steppers, MoveTheCentreOfMassOnAParabolaInFreeFlightWhateverTheActivation) {
-  constexpr int Dim = TypeParam::kDim;
-  constexpr bool is_explicit = TypeParam::kMethod == Method::kExplicit || TypeParam::kMethod == Method::kSpring;
+METHOD_TEST(Steppers, MoveTheCentreOfMassOnAParabolaInFreeFlightWhateverTheActivation) {
+  const bool is_explicit = method == Method::kExplicit || method == Method::kSpring;
   for (unsigned seed = 0; seed < trials(4u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
@@ -90,12 +86,11 @@ TYPED_TEST(Steppers, MoveTheCentreOfMassOnAParabolaInFreeFlightWhateverTheActiva
     const BodyOf<Dim>& body = scene.body;
     StateOf<Dim> start{body.rest, random_points<Dim>(random, body.node_count(), 1)};
     const VectorOf<Dim> from = momentum(body, start.v) / body.mass.sum(), place = centre_of_mass(body, start.x);
-    const StateOf<Dim> end = this->run(
-        scene, start, 240, [](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>&) {}, 0.2, seed);
+    const StateOf<Dim> end = run<Dim>(method, scene, start, 240, [](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>&) {}, 0.2, seed);
     if (kSanitized) continue;  // the rest is of the end
-    EXPECT_LT((momentum(body, end.v) / body.mass.sum() - from - scene.gravity).norm(), linear_tolerance(TypeParam::kMethod));
+    EXPECT_LT((momentum(body, end.v) / body.mass.sum() - from - scene.gravity).norm(), linear_tolerance(method));
     // Semi-implicit steps of h and shorter ones fall up to g h t / 2 farther than the parabola.
-    const double h = make_stepper(TypeParam::kMethod, scene)->substep(kDt), exact = is_explicit ? 1e-9 : 1e-5;
+    const double h = make_stepper(method, scene)->substep(kDt), exact = is_explicit ? 1e-9 : 1e-5;
     const VectorOf<Dim> beyond = centre_of_mass(body, end.x) - place - from - 0.5 * scene.gravity;
     const VectorOf<Dim> down = -VectorOf<Dim>::UnitY();
     EXPECT_LT((beyond - down.dot(beyond) * down).norm(), exact);
@@ -104,15 +99,13 @@ TYPED_TEST(Steppers, MoveTheCentreOfMassOnAParabolaInFreeFlightWhateverTheActiva
   }
 }
 
-TYPED_TEST(Steppers, BalanceMomentumWithTheBookedImpulsesInContact) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, BalanceMomentumWithTheBookedImpulsesInContact) {
   const SceneOf<Dim> scene = scene_of(four_legged<Dim>(), soles(four_legged<Dim>()), slope<Dim>(8, 0.6));
   const BodyOf<Dim>& body = scene.body;
   StateOf<Dim> start = laid_down(scene, 0.05);
   for (int i = 0; i < body.node_count(); ++i) start.v.col(i) = vec<Dim>(0.7, 0, 0.3);
   double worst = 0, worst_moment = 0;
-  this->run(
-      scene, start, 240,
+  run<Dim>(method, scene, start, 240,
       [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
         const VectorOf<Dim> change = momentum(body, after.v) - momentum(body, before.v);
         const VectorOf<Dim> contact = impulses.contact_nodes.rowwise().sum();
@@ -127,18 +120,17 @@ TYPED_TEST(Steppers, BalanceMomentumWithTheBookedImpulsesInContact) {
       0.1);
   EXPECT_LT(worst, 1e-6);
   // mg L; the last is backward Euler's own loss at touchdown.
-  const double tolerance = angular_tolerance(TypeParam::kMethod);
+  const double tolerance = angular_tolerance(method);
   EXPECT_LT(worst_moment, tolerance < 1e-9 ? 1e-9 : tolerance < 1 ? 1e-4 : 1.0);
 }
 
-TYPED_TEST(Steppers, BookDeclaredEffectsAndNothingElse) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, BookDeclaredEffectsAndNothingElse) {
   SceneOf<Dim> scene = scene_of(random_body<Dim>(3), {});
   scene.has_ground = false;
   const BodyOf<Dim>& body = scene.body;
   std::mt19937 random(3);
   const PointsOf<Dim> push = random_points<Dim>(random, body.node_count(), 20);
-  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
   ImpulsesOf<Dim> impulses = make_impulses(scene);
   StateOf<Dim> state{body.rest, PointsOf<Dim>::Zero(Dim, body.node_count())};
   for (int k = 0; k < 24; ++k) {
@@ -147,15 +139,14 @@ TYPED_TEST(Steppers, BookDeclaredEffectsAndNothingElse) {
     EXPECT_LT((impulses.effect_nodes - kDt * push).norm(), 1e-12);
     const VectorOf<Dim> change = momentum(body, state.v) - momentum(body, before.v);
     EXPECT_LT((change - kDt * (push.rowwise().sum() + body.mass.sum() * scene.gravity)).norm(),
-              1e-3 * linear_tolerance(TypeParam::kMethod));
+              1e-3 * linear_tolerance(method));
     const SpinOf<Dim> turned = angular_momentum(body, state.x, state.v, VectorOf<Dim>::Zero()) -
                                angular_momentum(body, before.x, before.v, VectorOf<Dim>::Zero());
-    EXPECT_LT((turned - impulses.effect_moment - impulses.gravity_moment).norm(), angular_tolerance(TypeParam::kMethod));
+    EXPECT_LT((turned - impulses.effect_moment - impulses.gravity_moment).norm(), angular_tolerance(method));
   }
 }
 
-TYPED_TEST(Steppers, PushFromTheGroundInsideTheConeWhereItIsTouched) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, PushFromTheGroundInsideTheConeWhereItIsTouched) {
   for (unsigned seed = 0; seed < trials(3u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     SceneOf<Dim> scene = scene_of(bar<Dim>(4, 2, 2, 0.1), soles(bar<Dim>(4, 2, 2, 0.1)), slope<Dim>(5.0 * seed, 0.5));
@@ -164,8 +155,7 @@ TYPED_TEST(Steppers, PushFromTheGroundInsideTheConeWhereItIsTouched) {
     for (int i = 0; i < scene.body.node_count(); ++i) start.v.col(i) = vec<Dim>(1, -0.5, 0.5);
     const VectorOf<Dim> normal = scene.ground.normal;
     int pushes = 0;
-    this->run(
-        scene, start, 240,
+    run<Dim>(method, scene, start, 240,
         [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
           for (int p = 0; p < scene.contact_points.count(); ++p) {
             const VectorOf<Dim> impulse = impulses.contact.col(p);
@@ -185,46 +175,43 @@ TYPED_TEST(Steppers, PushFromTheGroundInsideTheConeWhereItIsTouched) {
   }
 }
 
-TYPED_TEST(Steppers, LetABodyComeToRestOnFlatGroundThatCarriesItsWeight) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, LetABodyComeToRestOnFlatGroundThatCarriesItsWeight) {
   SceneOf<Dim> scene = scene_of(four_legged<Dim>(), soles(four_legged<Dim>()));
   add_skin_points(scene, 2, 1);
   const BodyOf<Dim>& body = scene.body;
   VectorOf<Dim> carried = VectorOf<Dim>::Zero();
   int steps = 0;
-  const StateOf<Dim> end = this->run(scene, laid_down(scene, 0.02), 720,
+  const StateOf<Dim> end = run<Dim>(method, scene, laid_down(scene, 0.02), 720,
                                      [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
                                        if (++steps > 600) carried += impulses.contact.rowwise().sum();
                                        EXPECT_LT(deepest(scene, after), 0.005 * size_of(body));
                                      });
   if (kSanitized) return;  // the rest is of the end
-  EXPECT_LT(end.v.colwise().norm().maxCoeff(), TypeParam::kMethod == Method::kXpbd ? 1e-3 : 1e-4);  // [m/s]
+  EXPECT_LT(end.v.colwise().norm().maxCoeff(), method == Method::kXpbd ? 1e-3 : 1e-4);  // [m/s]
   EXPECT_LT((carried / (120 * kDt) + body.mass.sum() * scene.gravity).norm(), 1e-3 * body.mass.sum() * kGravity);
   EXPECT_LT(deepest(scene, end), 0.0005 * size_of(body));
   EXPECT_GT(jacobians(body, end.x).minCoeff(), 0.8);
 }
 
-TYPED_TEST(Steppers, HoldABodyOnASlopeWithinTheConeOfFriction) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, HoldABodyOnASlopeWithinTheConeOfFriction) {
   const SceneOf<Dim> scene = scene_of(four_legged<Dim>(), soles(four_legged<Dim>()), slope<Dim>(20, 0.5));
   VectorOf<Dim> settled = VectorOf<Dim>::Zero();
   int steps = 0;
   const StateOf<Dim> end =
-      this->run(scene, laid_down(scene), 720, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
+      run<Dim>(method, scene, laid_down(scene), 720, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
         if (++steps == 480) settled = centre_of_mass(scene.body, after.x);
       });
   if (kSanitized) return;  // the rest is of the end
   EXPECT_LT((centre_of_mass(scene.body, end.x) - settled).norm(), 0.0005);  // [m] in one second
 }
 
-TYPED_TEST(Steppers, LetABodySlideDownASlopeBeyondTheConeOfFriction) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, LetABodySlideDownASlopeBeyondTheConeOfFriction) {
   const BodyOf<Dim> brick = bar<Dim>(6, 2, 4, 0.1);
   const SceneOf<Dim> scene = scene_of(brick, soles(brick), slope<Dim>(20, 0.3));
   const VectorOf<Dim> downhill = vec<Dim>(-scene.ground.normal.y(), scene.ground.normal.x(), 0);
   double speed = 0, faster = 0;
   int steps = 0;
-  this->run(scene, laid_down(scene), 480, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
+  run<Dim>(method, scene, laid_down(scene), 480, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
     const double along = downhill.dot(momentum(brick, after.v)) / brick.mass.sum();
     if (++steps == 240) speed = along;
     faster = along - speed;
@@ -234,54 +221,50 @@ TYPED_TEST(Steppers, LetABodySlideDownASlopeBeyondTheConeOfFriction) {
   EXPECT_NEAR(faster / (kGravity * (std::sin(angle) - 0.3 * std::cos(angle))), 1, 0.02);  // in the second second
 }
 
-TYPED_TEST(Steppers, GainNoEnergyFromADropOfABodysHeight) {
-  constexpr int Dim = TypeParam::kDim;
-  if (TypeParam::kMethod == Method::kXpbd) GTEST_SKIP() << "its passes leave constraints unsolved whose energy counts here";
+METHOD_TEST(Steppers, GainNoEnergyFromADropOfABodysHeight) {
+  if (method == Method::kXpbd) GTEST_SKIP() << "its passes leave constraints unsolved whose energy counts here";
   const BodyOf<Dim> body = four_legged<Dim>();
   const SceneOf<Dim> scene = scene_of(body, soles(body));
   SceneOf<Dim> counted = scene;
-  if (TypeParam::kMethod == Method::kSpring) counted.body.volume_stiffness.resize(0);  // it knows of no volume
+  if (method == Method::kSpring) counted.body.volume_stiffness.resize(0);  // it knows of no volume
   StateOf<Dim> start = laid_down(scene, 0.4);
   const double at_first = energy(counted, start, passive(body));
   double highest = 0;
-  this->run(scene, start, 480, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
+  run<Dim>(method, scene, start, 480, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
     highest = std::max(highest, energy(counted, after, passive(body)) - at_first);
   });
   EXPECT_LT(highest, 1e-3 * body.mass.sum() * kGravity * 0.4);
 }
 
-TYPED_TEST(Steppers, LiftAPointThatStartsBelowTheGroundWithoutThrowingIt) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, LiftAPointThatStartsBelowTheGroundWithoutThrowingIt) {
   const BodyOf<Dim> body = bar<Dim>(3, 2, 3, 0.1);
   const SceneOf<Dim> scene = scene_of(body, soles(body));
   StateOf<Dim> start = laid_down(scene, -0.01);
   double fastest = 0;
   const StateOf<Dim> end =
-      this->run(scene, start, 480, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
+      run<Dim>(method, scene, start, 480, [&](const StateOf<Dim>&, const StateOf<Dim>& after, const ImpulsesOf<Dim>&) {
         fastest = std::max(fastest, (momentum(body, after.v) / body.mass.sum()).norm());
       });
   if (kSanitized) return;  // the rest is of the end
   EXPECT_LT(deepest(scene, end), 0.0005 * size_of(body));
   EXPECT_LT(end.v.norm(), 1e-3);
   EXPECT_LT(fastest,
-            TypeParam::kMethod == Method::kExplicit ? 0.6 : 3);  // [m/s]; a spring gives back what the start put into it
+            method == Method::kExplicit ? 0.6 : 3);  // [m/s]; a spring gives back what the start put into it
 }
 
-TYPED_TEST(Steppers, GiveTheSameBytesTwice) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, GiveTheSameBytesTwice) {
   const SceneOf<Dim> scene = scene_of(four_legged<Dim>(), soles(four_legged<Dim>()), slope<Dim>(10, 0.4));
   const auto nothing = [](const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>&) {};
-  const StateOf<Dim> one = this->run(scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7),
-                     two = this->run(scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7);
+  const StateOf<Dim> one = run<Dim>(method, scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7),
+                     two = run<Dim>(method, scene, laid_down(scene, 0.02), 120, nothing, 0.2, 7);
   EXPECT_EQ(std::memcmp(one.x.data(), two.x.data(), sizeof(double) * static_cast<std::size_t>(one.x.size())), 0);
   EXPECT_EQ(std::memcmp(one.v.data(), two.v.data(), sizeof(double) * static_cast<std::size_t>(one.v.size())), 0);
 }
 
-TYPED_TEST(Steppers, AllocateNothingInTheStepLoop) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, AllocateNothingInTheStepLoop) {
   SceneOf<Dim> scene = scene_of(four_legged<Dim>(), soles(four_legged<Dim>()));
   add_skin_points(scene, 2, 1);
-  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
   ImpulsesOf<Dim> impulses = make_impulses(scene);
   StateOf<Dim> state = laid_down(scene, 0.01);
   std::mt19937 random(1);
@@ -297,11 +280,10 @@ TYPED_TEST(Steppers, AllocateNothingInTheStepLoop) {
   EXPECT_EQ(allocations - before, 0);
 }
 
-TYPED_TEST(Steppers, AllocateNothingInTheStepLoopOfElements) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, AllocateNothingInTheStepLoopOfElements) {
   SceneOf<Dim> scene = scene_of(random_element_body<Dim>(5, Cut::kBoxes, ElasticLaw::kStableNeoHookean), {});
   touch_with_whole_surface(scene);
-  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
   ImpulsesOf<Dim> impulses = make_impulses(scene);
   StateOf<Dim> state = laid_down(scene, 0.01);
   std::mt19937 random(1);
@@ -325,8 +307,7 @@ TEST(Explicit, AllocatesNothingWhereThreadsShareTheStep) {
   EXPECT_EQ(allocations - before, 0);
 }
 
-TYPED_TEST(Steppers, AllocateNothingInTheStepLoopOfABodyOnItself) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, AllocateNothingInTheStepLoopOfABodyOnItself) {
   SceneOf<Dim> scene =
       in_the_air(body_of(make_lattice<Dim>(7, 2, 1, 0.1, [](int i, int, int) { return i != 3; }), {1000, 2e5, 4, 0.01}), false);
   scene.self_contact.is_on = true;
@@ -335,7 +316,7 @@ TYPED_TEST(Steppers, AllocateNothingInTheStepLoopOfABodyOnItself) {
     if (state.x(0, i) > 0.35) state.x(0, i) -= 0.1;
     state.v(0, i) = state.x(0, i) < 0.32 && scene.body.rest(0, i) < 0.35 ? 0.2 : -0.2;
   }
-  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
   ImpulsesOf<Dim> impulses = make_impulses(scene);
   for (int k = 0; k < 4; ++k) stepper->step(kDt, passive(scene.body), nullptr, state, impulses);
   EXPECT_GT(impulses.internal_nodes.norm(), 0);
@@ -345,11 +326,10 @@ TYPED_TEST(Steppers, AllocateNothingInTheStepLoopOfABodyOnItself) {
   EXPECT_EQ(allocations - before, 0);
 }
 
-TYPED_TEST(Steppers, SayThatTheyDivergedAndLeaveTheStartState) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, SayThatTheyDivergedAndLeaveTheStartState) {
   const BodyOf<Dim> body = random_body<Dim>(2);
   const SceneOf<Dim> scene = scene_of(body, soles(body));
-  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+  const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
   ImpulsesOf<Dim> impulses = make_impulses(scene);
   const double nan = std::nan("");
   for (const double bad : {1e12, nan}) {
@@ -364,8 +344,7 @@ TYPED_TEST(Steppers, SayThatTheyDivergedAndLeaveTheStartState) {
   EXPECT_EQ(stepper->step(kDt, passive(body), nullptr, state, impulses), Termination::kDone);  // and go on afterwards
 }
 
-TYPED_TEST(Steppers, NeverCallAStateThatIsNoNumberDone) {
-  constexpr int Dim = TypeParam::kDim;
+METHOD_TEST(Steppers, NeverCallAStateThatIsNoNumberDone) {
   for (const bool flat : {true, false}) {
     SCOPED_TRACE(flat ? "flattened to y = 0" : "one tet inverted");
     BodyOf<Dim> body = bar<Dim>(4, 2, 2, 0.1);
@@ -381,7 +360,7 @@ TYPED_TEST(Steppers, NeverCallAStateThatIsNoNumberDone) {
       for (int k = 1; k <= Dim; ++k) middle += state.x.col(tet[k]) / Dim;
       state.x.col(tet[0]) += 1.5 * (middle - state.x.col(tet[0]));
     }
-    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(TypeParam::kMethod, scene);
+    const std::unique_ptr<StepperOf<Dim>> stepper = make_stepper(method, scene);
     ImpulsesOf<Dim> impulses = make_impulses(scene);
     int done = 0;
     for (; done < few_steps(480); ++done) {
@@ -389,7 +368,7 @@ TYPED_TEST(Steppers, NeverCallAStateThatIsNoNumberDone) {
       ASSERT_TRUE(state.x.allFinite() && state.v.allFinite());
       if (termination == Termination::kDiverged) break;
     }
-    if (TypeParam::kMethod == Method::kSpring) continue;  // springs have no inside
+    if (method == Method::kSpring) continue;  // springs have no inside
     EXPECT_EQ(done, few_steps(480));
     if (kSanitized) continue;  // the rest is of the end
     EXPECT_GT(jacobians(scene.body, state.x).minCoeff(), 0.99);  // both find back to the rest shape

@@ -145,7 +145,7 @@ void add_activations(std::vector<Hard>& list) {
 
 void add_contacts(std::vector<Hard>& list) {
   Hard squeeze;
-  squeeze.group = "squeezed to 30 % of its height, released";
+  squeeze.group = "squeezed to 30 % of its height and released";
   squeeze.name = "plates";
   squeeze.top = with_duration(4);
   squeeze.size = "[0.3, 0.3, 0.3]";

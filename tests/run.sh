@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds Hydrostat and passes its tests: the unit tests of physics and signals under the sanitizers (preset dev), then all tests
 # on the release build. Left to the release build alone: simulations in space, which the sanitizers draw out to minutes each; the
-# same sources run there in the plane.
+# same sources run there in the plane; and tests of materials and element matrices (tests/CMakeLists.txt).
 # Clips that are not ours are looked for in HYDROSTAT_ASSETS (default: shared/assets beside the project).
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")

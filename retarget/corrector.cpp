@@ -1,8 +1,10 @@
 #include "retarget/corrector.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+
+#include "retarget/contact_cones.h"
 
 namespace hydrostat::retarget {
 
@@ -66,44 +68,54 @@ void Corrector::add_response_of_elements(const physics::State& state) {
   }
 }
 
-double Corrector::correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching, double grip,
-                          Eigen::VectorXd& activation) {
-  const physics::Body& body = scene_.body;
-  const int nodes = body.node_count();
-  const double th = options_.horizon_s, mass = body.mass.sum();
+bool Corrector::factor_system(const physics::State& state, const ContactNow& contact) {
+  const double th = options_.horizon_s;
   matrix_.set_zero();
-  matrix_.add_mass(body, 1);
-  matrix_.add_damping(body, state.x, th);
-  forces_.set_activation(activation);
+  matrix_.add_mass(scene_.body, 1);
+  matrix_.add_damping(scene_.body, state.x, th);
   forces_.add_stiffness(state.x, th * th, matrix_);
   const Eigen::Matrix3d stick_block = th * th * contact_stiffness_ * Eigen::Matrix3d::Identity();
   const Eigen::Matrix3d slide_block = th * th * contact_stiffness_ * scene_.ground.normal * scene_.ground.normal.transpose();
   for (int p = 0; p < scene_.contact_points.count(); ++p) {
-    const ContactState state_of_point = touching[static_cast<std::size_t>(p)];
+    const ContactState state_of_point = contact.touching[static_cast<std::size_t>(p)];
     if (state_of_point == ContactState::kOff) continue;
     matrix_.add_contact(scene_.contact_points, p, state_of_point == ContactState::kStick ? stick_block : slide_block);
   }
-  if (!matrix_.factor()) return 0;
+  return matrix_.factor();
+}
 
-  // Columns: th B phi for each muscle, and the free deviation last.
+/// Fills the response: A^-1 th B phi for each muscle, and the free deviation last.
+void Corrector::respond(const physics::State& state, const physics::State& reference) {
+  const physics::Body& body = scene_.body;
   const Eigen::Index muscles = muscles_.fields.cols();
-  response_.resize(3 * nodes, muscles + 1);
-  response_.setZero();
+  response_.setZero(3 * body.node_count(), muscles + 1);
   add_response_of_springs(state);
   add_response_of_elements(state);
-  force_.setZero(3, nodes);
-  reference_force_.setZero(3, nodes);
+  force_.setZero(3, body.node_count());
+  reference_force_.setZero(3, body.node_count());
   forces_.add_elastic_forces(state.x, force_);
   forces_.add_elastic_forces(reference.x, reference_force_);
-  for (int i = 0; i < nodes; ++i) {
+  for (int i = 0; i < body.node_count(); ++i) {
     response_.col(muscles).segment<3>(3 * i) =
-        body.mass[i] * (state.v.col(i) - reference.v.col(i)) + th * (force_.col(i) - reference_force_.col(i));
+        body.mass[i] * (state.v.col(i) - reference.v.col(i)) + options_.horizon_s * (force_.col(i) - reference_force_.col(i));
   }
   matrix_.solve_in_place(response_);
-  for (int i = 0; i < nodes; ++i) response_.col(muscles).segment<3>(3 * i) += (state.x.col(i) - reference.x.col(i)) / options_.settle_s;
+}
 
-  // Rows: every node by its share of the mass, then the six rows of momentum, all as speeds per sqrt(g L).
-  weighted_.resize(3 * nodes + 6, muscles + 1);
+/// Every node by its share of the mass.
+void Corrector::weigh_nodes() {
+  const Eigen::VectorXd& mass = scene_.body.mass;
+  for (Eigen::Index i = 0; i < mass.size(); ++i) {
+    weighted_.middleRows<3>(3 * i) =
+        (options_.node_weight * std::sqrt(mass[i] / mass.sum()) / speed_unit_) * response_.middleRows<3>(3 * i);
+  }
+}
+
+/// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration.
+void Corrector::weigh_momentum(const physics::State& state, double grip) {
+  const physics::Body& body = scene_.body;
+  const int nodes = body.node_count();
+  const double mass = body.mass.sum();
   const Eigen::Vector3d com = physics::centre_of_mass(body, state.x);
   const Eigen::Matrix3d inertia = physics::inertia(body, state.x, com);
   const double gyration = std::sqrt(inertia.trace() / 2 / mass);
@@ -115,17 +127,69 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
     cross << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
     rows.block<3, 3>(0, 3 * i).diagonal().setConstant(body.mass[i] / mass);
     rows.block<3, 3>(3, 3 * i) = gyration * body.mass[i] * inverse_inertia * cross;
-    weighted_.middleRows<3>(3 * i) = (options_.node_weight * std::sqrt(body.mass[i] / mass) / speed_unit_) * response_.middleRows<3>(3 * i);
   }
   for (const int row : {0, 2, 4}) rows.row(row) *= grip;
-  weighted_.bottomRows<6>().noalias() = (options_.root_weight / speed_unit_) * rows * response_;
+  weighted_.middleRows<6>(3 * nodes).noalias() = (options_.root_weight / speed_unit_) * rows * response_;
+}
+
+/// The mean of each foot in the air, on its way to where it can catch the body.
+void Corrector::weigh_feet(const physics::State& state, const physics::State& reference, const std::vector<const Patch*>& in_air) {
+  const physics::Body& body = scene_.body;
+  const Eigen::Vector3d up = scene_.ground.normal, com = physics::centre_of_mass(body, reference.x);
+  const double height = std::max(0.0, up.dot(com) - scene_.ground.offset), gravity = scene_.gravity.norm();
+  const double ahead_s = gravity > 0 ? options_.step_ahead * std::sqrt(height / gravity) : 0;
+  const Eigen::Vector3d ahead = physics::centre_of_mass(body, state.x) - com + ahead_s * (state.v - reference.v) * body.mass / body.mass.sum();
+  const Eigen::Vector3d step = options_.step * (ahead - up.dot(ahead) * up);
+  const Eigen::Index last = response_.cols() - 1;
+  Eigen::Index row = 3 * body.node_count() + 6;
+  for (const Patch* foot : in_air) {
+    auto mean = weighted_.middleRows<3>(row);
+    mean.setZero();
+    Eigen::Vector3d error = -step;
+    const double share = 1 / static_cast<double>(foot->points.size());
+    for (const int p : foot->points) {
+      for (int c = 0; c < scene_.contact_points.nodes.rows(); ++c) {
+        const int node = scene_.contact_points.nodes(c, p);
+        mean += share * scene_.contact_points.weights(c, p) * response_.middleRows<3>(3 * node);
+      }
+      error += share * (scene_.contact_points.of(state.x, p) - scene_.contact_points.of(reference.x, p));
+    }
+    mean.col(last) += error / options_.foot_settle_s;
+    mean *= options_.foot_weight / speed_unit_;
+    row += 3;
+  }
+}
+
+double Corrector::least_margin() const {
+  if (cones_.rows() == 0) return 0;
+  return (cones_.leftCols(previous_.size()) * previous_ + cones_.col(previous_.size())).minCoeff();
+}
+
+double Corrector::correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
+                          Eigen::VectorXd& activation) {
+  const physics::Body& body = scene_.body;
+  const int nodes = body.node_count();
+  const Eigen::Index muscles = muscles_.fields.cols();
+  forces_.set_activation(activation);
+  if (!factor_system(state, contact)) return 0;
+  respond(state, reference);
+
+  // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.
+  weighted_.resize(3 * nodes + 6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
+  weigh_feet(state, reference, contact.in_air);
+  const double weight = body.mass.sum() * scene_.gravity.norm();
+  cone_rows(scene_, contact.touching, contact.bearing, contact.force / weight,
+            (contact_stiffness_ * options_.horizon_s / weight) * response_.leftCols(muscles), previous_, cones_);
+  response_.col(muscles) += (state.x - reference.x).reshaped() / options_.settle_s;
+  weigh_nodes();
+  weigh_momentum(state, contact.grip);
 
   normal_.setZero(muscles + 1, muscles + 1);
   normal_.selfadjointView<Eigen::Lower>().rankUpdate(weighted_.transpose());
   Eigen::MatrixXd left = normal_.topLeftCorner(muscles, muscles);
   left.diagonal().array() += options_.effort + options_.change;
   const Eigen::VectorXd right = options_.change * previous_ - normal_.row(muscles).head(muscles).transpose();
-  previous_ = left.selfadjointView<Eigen::Lower>().llt().solve(right);
+  previous_ = solve_within_cones(left, right, cones_, options_.cone_weight);
   activation += muscles_.fields * previous_;
   activation = activation.cwiseMax(1 - limit_).cwiseMin(1 + limit_);
   return std::sqrt(previous_.squaredNorm() / static_cast<double>(muscles));

@@ -14,24 +14,45 @@ struct CorrectorOptions {
   double root_weight = 6;       // of the six rows of momentum
   double effort = 5;            // eps, per squared muscle, with speeds per sqrt(g L)
   double change = 1e-3;         // eps_d, per squared change of a muscle
+  double cone_weight = 10;      // per m g by which the force at a point that is to bear load would leave its friction cone
+  double foot_weight = 3;       // of the rows of a foot in the air
+  double foot_settle_s = 0.1;   // tau of a foot in the air
+  double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
+  double step_ahead = 1.25;     // of sqrt(h / g): how far ahead of its error the centre of mass is met
+};
+
+/// What contact does when muscles are corrected, and what it is to do.
+struct ContactNow {
+  std::vector<ContactState> touching;  // P: a sliding point holds the body up but not back
+  Eigen::Matrix3Xd force;              // 3 x P [N], of the control step before
+  std::vector<bool> bearing;           // P: by plan it bears load now and until the horizon's end
+  std::vector<const Patch*> in_air;    // feet that touch nothing; they must outlive the call
+  double grip = 1;                     // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
+                                       // friction sets the ground's sideways force, and pushing harder only slips more
 };
 
 /// Feedback on the muscles in deviation form: nothing on the nominal path.
 ///
 /// dv_free = A^-1 [M ev + Th (f_int(x; a_ff) - f_int(x_ref; a_ff))], A = M + Th D + Th^2 (K + Kc on the points that touch now),
-/// min_w |W (dv_free + A^-1 Th B Phi w + ex / tau)|^2 + eps |w|^2 + eps_d |w - w_previous|^2. Source: the design, section 8.
+/// min_w |W (dv_free + A^-1 Th B Phi w + ex / tau)|^2 + eps |w|^2 + eps_d |w - w_previous|^2 + the squared excess of contact forces over
+/// their cones (contact_cones.h). W weighs the nodes by mass, the six rows of momentum, and the mean of each foot in the air, which is
+/// sent to where the centre of mass can be caught: its error moves by e + c sqrt(h / g) e' with the error e of the centre of mass over
+/// the ground and its height h.
+/// Sources: the design, section 8; Raibert, "Legged Robots That Balance", 1986, chapter 2, for the placement of feet by speed; Pratt et al.,
+/// "Capture Point: A Step toward Humanoid Push Recovery", Humanoids 2006, equation 5, for the way that sqrt(h / g) gives.
 class Corrector {
  public:
   /// length [m] is L. Scene and muscles must outlive the corrector.
   Corrector(const physics::Scene& scene, const Muscles& muscles, double length, double limit, const CorrectorOptions& options);
 
-  /// Adds the correction to `activation` (E, the feed-forward on entry), clamped to the limit. `touching` P says what each contact
-  /// point does now: a sliding one holds the body up but not back. `grip` in [0, 1] weighs the rows of horizontal
-  /// momentum: where contacts are meant to slide, friction sets the ground's sideways force, and pushing harder only slips more. Returns the RMS of the muscles' correction.
-  double correct(const physics::State& state, const physics::State& reference, const std::vector<ContactState>& touching, double grip,
-                 Eigen::VectorXd& activation);
+  /// Adds the correction to `activation` (E, the feed-forward on entry), clamped to the limit. Returns the RMS of the muscles'
+  /// correction.
+  double correct(const physics::State& state, const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation);
   void reset() { previous_.setZero(); }
   const Eigen::VectorXd& muscles_now() const { return previous_; }
+  /// How far inside their cones the forces at bearing points stay over the horizon, by the last correction's own model [m g]; negative
+  /// outside, 0 where nothing bears.
+  double least_margin() const;
 
  private:
   /// What the muscles do to the constraints of one element.
@@ -41,6 +62,11 @@ class Corrector {
   };
   void add_response_of_springs(const physics::State& state);
   void add_response_of_elements(const physics::State& state);
+  bool factor_system(const physics::State& state, const ContactNow& contact);
+  void respond(const physics::State& state, const physics::State& reference);
+  void weigh_nodes();
+  void weigh_momentum(const physics::State& state, double grip);
+  void weigh_feet(const physics::State& state, const physics::State& reference, const std::vector<const Patch*>& in_air);
 
   const physics::Scene& scene_;
   const Muscles& muscles_;
@@ -49,7 +75,8 @@ class Corrector {
   physics::SystemMatrix matrix_;
   physics::InternalForces<3> forces_;
   std::vector<std::vector<ElementFields>> element_fields_;  // of the elements of each block
-  Eigen::MatrixXd response_, weighted_, normal_;
+  Eigen::MatrixXd response_;  // 3N x (muscles + 1): change of velocity by each muscle, and what comes without any
+  Eigen::MatrixXd weighted_, normal_, cones_;
   Eigen::VectorXd free_, previous_;
   Eigen::Matrix3Xd force_, reference_force_;
 };

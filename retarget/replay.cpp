@@ -23,15 +23,6 @@ Eigen::Vector3d pushed_velocity(const std::vector<Push>& pushes, double begin, d
   return velocity;
 }
 
-/// 0 where a patch is meant to slide, 1 elsewhere.
-double planned_grip(const PreparedTarget& prepared, double time_s) {
-  const auto frame = static_cast<std::size_t>(frame_at(prepared.target, time_s));
-  for (const std::vector<ContactState>& states : prepared.contacts.state) {
-    if (states[frame] == ContactState::kSlide) return 0;
-  }
-  return 1;
-}
-
 Eigen::Map<const Eigen::VectorXd> column(const Eigen::Matrix3Xd& points) { return {points.data(), points.size()}; }
 
 /// The target's first state; what is played once begins at rest.
@@ -42,12 +33,17 @@ physics::State first_state(const Motion& target, const MotionCurve& curve) {
   return state;
 }
 
-std::vector<ContactState> first_touching(const ContactSchedule& contacts) {
-  std::vector<ContactState> states(static_cast<std::size_t>(contacts.touching.rows()), ContactState::kOff);
-  for (std::size_t k = 0; k < states.size(); ++k) {
-    if (contacts.touching(static_cast<Eigen::Index>(k), 0)) states[k] = ContactState::kStick;
+/// Before anything was simulated: what touches by plan sticks.
+ContactNow first_contact(const ContactSchedule& contacts) {
+  const Eigen::Index points = contacts.touching.rows();
+  ContactNow now;
+  now.touching.resize(static_cast<std::size_t>(points), ContactState::kOff);
+  now.bearing.resize(now.touching.size(), false);
+  now.force.setZero(3, points);
+  for (Eigen::Index p = 0; p < points; ++p) {
+    if (contacts.touching(p, 0)) now.touching[static_cast<std::size_t>(p)] = ContactState::kStick;
   }
-  return states;
+  return now;
 }
 
 /// One free simulation, from control step to control step.
@@ -57,6 +53,7 @@ class Run {
   Replay play();
 
  private:
+  void look_at_contacts();
   void control();
   physics::Termination advance();
   void write_trace(long row);
@@ -78,7 +75,7 @@ class Run {
   physics::State state_, reference_, glided_;
   RigidFit fit_;                                // from reference_ to state_
   Eigen::VectorXd activation_;                  // E
-  std::vector<ContactState> touching_;          // P
+  ContactNow contact_;
   physics::Impulses impulses_, step_impulses_;  // of a solver step, of a control step
   Eigen::Matrix3Xd effect_;                     // [N]
   const ContactThresholds thresholds_;
@@ -103,7 +100,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
       state_(first_state(target_, curve_)),
       activation_(input.scene.body.edge_count()),
-      touching_(first_touching(input.prepared.contacts)),
+      contact_(first_contact(input.prepared.contacts)),
       impulses_(physics::make_impulses(input.scene)),
       step_impulses_(impulses_),
       effect_(3, input.scene.body.node_count()),
@@ -117,6 +114,28 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
   write_trace(0);
 }
 
+/// What the plan wants of the contacts from now until the corrector's horizon, and which feet are in the air.
+void Run::look_at_contacts() {
+  const ContactSchedule& plan = input_.prepared.contacts;
+  const auto now = static_cast<std::size_t>(frame_at(target_, time_s_));
+  const auto then = static_cast<std::size_t>(frame_at(target_, time_s_ + options_.corrector.horizon_s));
+  contact_.grip = 1;
+  contact_.in_air.clear();
+  std::fill(contact_.bearing.begin(), contact_.bearing.end(), false);
+  for (std::size_t k = 0; k < plan.patches.size(); ++k) {
+    const std::vector<ContactState>& planned = plan.state[k];
+    if (planned[now] == ContactState::kSlide) contact_.grip = 0;
+    const bool bears = planned[now] != ContactState::kOff && planned[then] != ContactState::kOff;
+    bool touches = false;
+    for (const int p : plan.patches[k].points) {
+      const auto point = static_cast<std::size_t>(p);
+      contact_.bearing[point] = bears;
+      touches = touches || contact_.touching[point] != ContactState::kOff;
+    }
+    if (!touches) contact_.in_air.push_back(&plan.patches[k]);
+  }
+}
+
 /// The activations for the coming control step.
 void Run::control() {
   curve_.at(time_s_, reference_.x, reference_.v);
@@ -127,7 +146,8 @@ void Run::control() {
   glided_ = reference_;
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
-  correction_ = corrector_.correct(state_, glided_, touching_, planned_grip(input_.prepared, time_s_), activation_);
+  look_at_contacts();
+  correction_ = corrector_.correct(state_, glided_, contact_, activation_);
 }
 
 physics::Termination Run::advance() {
@@ -163,8 +183,9 @@ void Run::measure(long step) {
   if (step % steps_per_frame_ == 0) frames_.emplace_back(column(state_.x));
   curve_.at(time_s_, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
-  touching_ = point_states(input_.scene, state_, step_impulses_.contact, thresholds_);
-  metrics_.add({time_s_, state_, reference_, fit_, activation_, correction_, step_impulses_, touching_});
+  contact_.touching = point_states(input_.scene, state_, step_impulses_.contact, thresholds_);
+  contact_.force = step_impulses_.contact / control_s_;
+  metrics_.add({time_s_, state_, reference_, fit_, activation_, correction_, step_impulses_, contact_.touching});
 }
 
 Replay Run::play() {

@@ -27,7 +27,9 @@ constexpr int kEighths = 8, kQuarters = 4;
 void set_variant(const std::string& variant, retarget::CorrectorOptions& options) {
   const std::map<std::string, double*> knobs{{"effort", &options.effort},       {"settle", &options.settle_s},
                                              {"nodes", &options.node_weight},   {"root", &options.root_weight},
-                                             {"horizon", &options.horizon_s}};
+                                             {"horizon", &options.horizon_s}, {"cone", &options.cone_weight},
+                                             {"foot", &options.foot_weight},  {"foot_settle", &options.foot_settle_s},
+                                             {"step", &options.step},         {"ahead", &options.step_ahead}};
   std::istringstream parts(variant);
   for (std::string part; std::getline(parts, part, ':');) {
     if (part == "usual") continue;

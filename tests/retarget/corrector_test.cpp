@@ -18,10 +18,47 @@ struct Controlled {
   BoxCreature creature;
   Muscles muscles = make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights);
   physics::State rest{creature.scene.body.rest, Eigen::Matrix3Xd::Zero(3, creature.scene.body.node_count())};
-  std::vector<ContactState> standing =
-      std::vector<ContactState>(static_cast<std::size_t>(creature.scene.contact_points.count()), ContactState::kStick);
-  std::vector<ContactState> flying = std::vector<ContactState>(standing.size(), ContactState::kOff);
+  ContactNow standing = everywhere(ContactState::kStick), flying = everywhere(ContactState::kOff);
+  Patch lifted = first_foot();
   Eigen::VectorXd passive = Eigen::VectorXd::Ones(creature.scene.body.edge_count());
+
+  /// No point is to bear load.
+  ContactNow everywhere(ContactState state) const {
+    const int points = creature.scene.contact_points.count();
+    ContactNow contact;
+    contact.touching.assign(static_cast<std::size_t>(points), state);
+    contact.bearing.assign(contact.touching.size(), false);
+    contact.force.setZero(3, points);
+    return contact;
+  }
+
+  /// All points bear the same share of the weight.
+  ContactNow bearing() const {
+    ContactNow contact = standing;
+    contact.bearing.assign(contact.touching.size(), true);
+    contact.force.row(1).setConstant(creature.mass() * 9.81 / static_cast<double>(contact.touching.size()));
+    return contact;
+  }
+
+  /// As bearing(), but the first patch, the back right foot, is in the air.
+  ContactNow on_three_legs() const {
+    ContactNow contact = bearing();
+    for (const int p : lifted.points) {
+      contact.touching[static_cast<std::size_t>(p)] = ContactState::kOff;
+      contact.bearing[static_cast<std::size_t>(p)] = false;
+      contact.force.col(p).setZero();
+    }
+    contact.in_air = {&lifted};
+    return contact;
+  }
+
+  Patch first_foot() const {
+    Patch foot{creature.skeleton.names[1], {}};
+    for (int p = 0; p < creature.scene.contact_points.count(); ++p) {
+      if (creature.patch_bone[static_cast<std::size_t>(p)] == 1) foot.points.push_back(p);
+    }
+    return foot;
+  }
 
   Corrector corrector(const CorrectorOptions& options = {}) const {
     return Corrector(creature.scene, muscles, BoxCreature::kLength, kLimit, options);
@@ -52,7 +89,8 @@ TEST(Corrector, DoesNothingOnTheNominalPath) {
     const Eigen::VectorXd given = physics::random_activation(random, controlled.creature.scene.body, 0.2);
     Eigen::VectorXd activation = given;
     Corrector corrector = controlled.corrector();
-    EXPECT_EQ(corrector.correct(state, state, controlled.standing, 1, activation), 0);
+    EXPECT_EQ(corrector.correct(state, state, controlled.bearing(), activation), 0);
+    EXPECT_EQ(corrector.correct(state, state, controlled.on_three_legs(), activation), 0);
     EXPECT_EQ(activation, given);
   }
 }
@@ -65,7 +103,7 @@ TEST(Corrector, PushesBackAgainstAnErrorOfVelocity) {
     state.v.colwise() += 0.2 * direction;
     Corrector corrector = controlled.corrector();
     Eigen::VectorXd activation = controlled.passive;
-    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, 1, activation), 0);
+    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, activation), 0);
     EXPECT_LT(controlled.gained(state, activation, direction, 1.0 / 30), 0);
   }
 }
@@ -76,11 +114,11 @@ TEST(Corrector, PushesBackThroughElementsToo) {
     physics::State state = controlled.rest;
     Corrector corrector = controlled.corrector();
     Eigen::VectorXd activation = controlled.passive;
-    EXPECT_EQ(corrector.correct(state, controlled.rest, controlled.standing, 1, activation), 0);
+    EXPECT_EQ(corrector.correct(state, controlled.rest, controlled.standing, activation), 0);
     EXPECT_EQ(activation, controlled.passive);
     const Eigen::Vector3d direction(1, 0, 0);
     state.v.colwise() += 0.2 * direction;
-    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, 1, activation), 0);
+    EXPECT_GT(corrector.correct(state, controlled.rest, controlled.standing, activation), 0);
     EXPECT_LT(controlled.gained(state, activation, direction, 1.0 / 30), 0);
   }
 }
@@ -92,7 +130,7 @@ TEST(Corrector, PushesBackAgainstAnErrorOfPlace) {
     reference.x.colwise() -= 0.02 * direction;
     Corrector corrector = controlled.corrector();
     Eigen::VectorXd activation = controlled.passive;
-    corrector.correct(controlled.rest, reference, controlled.standing, 1, activation);
+    corrector.correct(controlled.rest, reference, controlled.standing, activation);
     EXPECT_LT(controlled.gained(controlled.rest, activation, direction, 1.0 / 30), 0);
   }
 }
@@ -104,7 +142,59 @@ TEST(Corrector, CannotMoveTheCentreOfMassInTheAir) {
   state.v.colwise() += Eigen::Vector3d(0.2, 0, 0);
   Eigen::VectorXd in_flight = controlled.passive, on_feet = controlled.passive;
   Corrector a = controlled.corrector(), b = controlled.corrector();
-  EXPECT_LT(a.correct(state, controlled.rest, controlled.flying, 1, in_flight), 0.01 * b.correct(state, controlled.rest, controlled.standing, 1, on_feet));
+  EXPECT_LT(a.correct(state, controlled.rest, controlled.flying, in_flight), 0.01 * b.correct(state, controlled.rest, controlled.standing, on_feet));
+}
+
+TEST(Corrector, DoesNotPullAtTheGround) {
+  // A body that rolls over its left feet would be held by a pull at the right ones, which the ground cannot give.
+  const Controlled controlled;
+  const ContactNow contact = controlled.bearing();
+  const double share = 1 / static_cast<double>(contact.touching.size());
+  for (const double speed : {0.2, 0.5, 1.0}) {
+    physics::State state = controlled.rest;
+    for (Eigen::Index i = 0; i < state.x.cols(); ++i) {
+      state.v.col(i) = Eigen::Vector3d(speed / 0.2, 0, 0).cross(state.x.col(i) - Eigen::Vector3d(0, 0, 0.4));
+    }
+    double least[2];
+    for (const bool with_cones : {false, true}) {
+      CorrectorOptions options;
+      if (!with_cones) options.cone_weight = 0;
+      Corrector corrector = controlled.corrector(options);
+      Eigen::VectorXd activation = controlled.passive;
+      corrector.correct(state, controlled.rest, contact, activation);
+      least[with_cones] = corrector.least_margin() / share;
+    }
+    EXPECT_LT(least[0], -0.2) << "speed " << speed;
+    EXPECT_GT(least[1], 0.1 * least[0]) << "speed " << speed;
+  }
+}
+
+TEST(Corrector, SendsAFootInTheAirWhereItCatchesTheBody) {
+  const Controlled controlled;
+  const ContactNow contact = controlled.on_three_legs();
+  for (const Eigen::Vector3d& direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0), Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+    SCOPED_TRACE(::testing::Message() << "error along " << direction.transpose());
+    physics::State state = controlled.rest;
+    state.v.colwise() += 0.1 * direction;
+    double way[2];
+    for (const bool with_steps : {false, true}) {
+      CorrectorOptions options;
+      if (!with_steps) options.step = 0;
+      Corrector corrector = controlled.corrector(options);
+      Eigen::VectorXd activation = controlled.passive;
+      corrector.correct(state, controlled.rest, contact, activation);
+      physics::State now = state;
+      now.x.row(1).array() += 0.05;  // clear of the ground
+      const auto stepper = physics::make_explicit_stepper(controlled.creature.scene);
+      physics::Impulses impulses = physics::make_impulses(controlled.creature.scene);
+      for (int s = 0; s < 8; ++s) stepper->step(1.0 / 240, activation, nullptr, now, impulses);
+      Eigen::Vector3d foot = Eigen::Vector3d::Zero();
+      for (const int p : controlled.lifted.points) foot += controlled.creature.scene.contact_points.of(now.x, p);
+      foot /= static_cast<double>(controlled.lifted.points.size());
+      way[with_steps] = direction.dot(foot - physics::centre_of_mass(controlled.creature.scene.body, now.x));
+    }
+    EXPECT_GT(way[1], way[0] + 1e-4);
+  }
 }
 
 TEST(Corrector, KeepsToTheLimit) {
@@ -117,7 +207,7 @@ TEST(Corrector, KeepsToTheLimit) {
     state.v.colwise() += Eigen::Vector3d(8, 0, 0);
     Eigen::VectorXd activation = physics::random_activation(random, controlled.creature.scene.body, kLimit);
     Corrector corrector = controlled.corrector();
-    corrector.correct(state, controlled.rest, controlled.standing, 1, activation);
+    corrector.correct(state, controlled.rest, controlled.standing, activation);
     EXPECT_LE(activation.maxCoeff(), 1 + kLimit);
     EXPECT_GE(activation.minCoeff(), 1 - kLimit);
     EXPECT_GT((activation.array() - 1).abs().maxCoeff(), 0.999 * kLimit);
@@ -131,9 +221,9 @@ TEST(Corrector, AnswersTwiceTheErrorWithTwiceTheMuscles) {
   twice.v.colwise() += Eigen::Vector3d(0.1, 0, 0.04);
   Eigen::VectorXd activation = controlled.passive;
   Corrector a = controlled.corrector(), b = controlled.corrector();
-  a.correct(once, controlled.rest, controlled.standing, 1, activation);
+  a.correct(once, controlled.rest, controlled.standing, activation);
   activation = controlled.passive;
-  b.correct(twice, controlled.rest, controlled.standing, 1, activation);
+  b.correct(twice, controlled.rest, controlled.standing, activation);
   EXPECT_LT((2 * a.muscles_now() - b.muscles_now()).norm(), 1e-9 * b.muscles_now().norm());
 }
 
@@ -147,7 +237,7 @@ TEST(Corrector, LessEffortIsSpentWhereItCostsMore) {
     options.effort = effort;
     Corrector corrector = controlled.corrector(options);
     Eigen::VectorXd activation = controlled.passive;
-    const double spent = corrector.correct(state, controlled.rest, controlled.standing, 1, activation);
+    const double spent = corrector.correct(state, controlled.rest, controlled.standing, activation);
     EXPECT_LT(spent, last);
     last = spent;
   }
@@ -159,9 +249,9 @@ TEST(Corrector, ForgetsWhenReset) {
   state.v.colwise() += Eigen::Vector3d(0.2, 0, 0);
   Corrector corrector = controlled.corrector();
   Eigen::VectorXd first = controlled.passive, again = controlled.passive;
-  corrector.correct(state, controlled.rest, controlled.standing, 1, first);
+  corrector.correct(state, controlled.rest, controlled.standing, first);
   corrector.reset();
-  corrector.correct(state, controlled.rest, controlled.standing, 1, again);
+  corrector.correct(state, controlled.rest, controlled.standing, again);
   EXPECT_EQ(first, again);
 }
 

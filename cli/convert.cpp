@@ -20,6 +20,7 @@
 #include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/flight.h"
+#include "retarget/limbs.h"
 #include "retarget/run_warnings.h"
 #include "retarget/self_contact_plan.h"
 
@@ -261,9 +262,12 @@ class Conversion {
     const physics::Scene& scene = creature_.scene;
     key_ = key_after(key_, options_.friction);
     retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] {
-      return retarget::prepare(motion_.nodes, retarget::preparation_scene(creature_), retarget::bones_of(creature_.contacts),
-                               creature_.character.skeleton.names, creature_.mesh.bone_weights, creature_.length,
-                               creature_.size, retarget::prepare_options(motion_));
+      retarget::PreparedTarget found = retarget::prepare(
+          motion_.nodes, retarget::preparation_scene(creature_), retarget::bones_of(creature_.contacts),
+          creature_.character.skeleton.names, creature_.mesh.bone_weights, creature_.length, creature_.size,
+          retarget::prepare_options(motion_));
+      retarget::find_legs(creature_.character.skeleton, found.contacts);
+      return found;
     });
     retarget::InverseOptions inverse_options;
     inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);

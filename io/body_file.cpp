@@ -205,7 +205,7 @@ std::string body_text(const retarget::Performer& performer, const std::vector<st
                             {"weights", list(performer.contacts.embedding.weights)}};
   json["patches"] = Json::array();
   for (const retarget::Patch& patch : performer.prepared.contacts.patches) {
-    json["patches"].push_back({{"name", patch.name}, {"points", patch.points}});
+    json["patches"].push_back({{"name", patch.name}, {"points", patch.points}, {"on_leg", patch.on_leg}});
   }
   std::string text;
   for (const auto& [key, value] : json.items()) {

@@ -16,7 +16,7 @@ namespace hydrostat::io {
 ///   poissons_ratio;
 ///   muscles (names);
 ///   skin {vertices, triangles, nodes, weights}: vertex v stands at the sum of weights[v] times nodes[v];
-///   contact_points {vertices, bones, nodes, weights}; patches [{name, points}]: contact points that touch together.
+///   contact_points {vertices, bones, nodes, weights}; patches [{name, points, on_leg}]: contact points that touch together; those on legs step.
 /// Numbers come back to the bit.
 std::string body_text(const retarget::Performer& performer, const std::vector<std::string>& bones,
                       const Eigen::VectorXi& node_bones);

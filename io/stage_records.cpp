@@ -10,7 +10,7 @@ namespace hydrostat::io {
 namespace {
 
 constexpr const char* kTargetTitle = "hydrostat.target";
-constexpr const char* kTargetVersion = "1";
+constexpr const char* kTargetVersion = "2";
 
 /// Skin weights one after the other.
 struct Influences {
@@ -146,7 +146,7 @@ void name_fields(RecordArchive& archive, retarget::ImportedMotion& imported) {
 }
 
 void name_fields(RecordArchive& archive, retarget::Patch& patch) {
-  archive.fields("name", patch.name, "points", patch.points);
+  archive.fields("name", patch.name, "points", patch.points, "on_leg", patch.on_leg);
 }
 
 void name_fields(RecordArchive& archive, retarget::ContactSchedule& contacts) {

@@ -32,6 +32,7 @@ void cone_rows(const physics::Scene& scene, const std::vector<ContactState>& tou
     }
     given.col(muscles) = force.col(p) - given.leftCols(muscles) * now;
     rows.middleRows(row, of_point).noalias() = faces.topRows(of_point) * given;
+    rows.col(muscles).segment(row, of_point) = rows.col(muscles).segment(row, of_point).cwiseMax(0);
     row += of_point;
   }
 }

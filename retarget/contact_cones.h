@@ -9,7 +9,8 @@
 namespace hydrostat::retarget {
 
 /// One row (c, d) for each side of a contact force's friction pyramid, at points that touch and are to bear load: the force stays inside
-/// while c w + d >= 0. Five rows a sticking point, one a sliding point, whose normal force alone is up to the muscles.
+/// while c w + d >= 0. A side that no correction at all would leave is not asked to be kept (d is not negative), else muscles could not
+/// let go of it again. Five rows a sticking point, one a sliding point, whose normal force alone is up to the muscles.
 /// `touching`, `bearing` P; `force` 3 x P, what the points give now; `approach` 3N x M, how the nodes' velocities change by each muscle,
 /// in units of force that a point gives against them; `now` M, the muscles that led to `force`. Fills `rows`, R x (M + 1).
 void cone_rows(const physics::Scene& scene, const std::vector<ContactState>& touching, const std::vector<bool>& bearing,

@@ -16,6 +16,7 @@ enum class ContactState : char { kOff, kStick, kSlide };
 struct Patch {
   std::string name;         // of the bone
   std::vector<int> points;  // indices of contact points
+  bool on_leg = false;      // on a limb of its own, that can step; see find_legs
 };
 
 struct ContactSchedule {

@@ -15,10 +15,10 @@ struct CorrectorOptions {
   double effort = 5;            // eps, per squared muscle, with speeds per sqrt(g L)
   double change = 1e-3;         // eps_d, per squared change of a muscle
   double cone_weight = 10;      // per m g by which the force at a point that is to bear load would leave its friction cone
-  double foot_weight = 3;       // of the rows of a foot in the air
+  double foot_weight = 4;       // of the rows of a foot in the air
   double foot_settle_s = 0.1;   // tau of a foot in the air
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
-  double step_ahead = 1.25;     // of sqrt(h / g): how far ahead of its error the centre of mass is met
+  double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
 };
 
 /// What contact does when muscles are corrected, and what it is to do.
@@ -26,7 +26,7 @@ struct ContactNow {
   std::vector<ContactState> touching;  // P: a sliding point holds the body up but not back
   Eigen::Matrix3Xd force;              // 3 x P [N], of the control step before
   std::vector<bool> bearing;           // P: by plan it bears load now and until the horizon's end
-  std::vector<const Patch*> in_air;    // feet that touch nothing; they must outlive the call
+  std::vector<const Patch*> in_air;    // patches on legs that touch nothing; they must outlive the call
   double grip = 1;                     // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
                                        // friction sets the ground's sideways force, and pushing harder only slips more
 };

@@ -36,6 +36,17 @@ LimbTable bones_of_different_limbs(const Skeleton& skeleton) {
   return different;
 }
 
+void find_legs(const Skeleton& skeleton, ContactSchedule& contacts) {
+  const LimbTable different = bones_of_different_limbs(skeleton);
+  const auto bone_of = [&](const Patch& patch) {
+    return std::find(skeleton.names.begin(), skeleton.names.end(), patch.name) - skeleton.names.begin();
+  };
+  for (Patch& patch : contacts.patches) {
+    patch.on_leg = std::any_of(contacts.patches.begin(), contacts.patches.end(),
+                               [&](const Patch& other) { return different(bone_of(patch), bone_of(other)); });
+  }
+}
+
 Eigen::VectorXi dominant_bones(const SkinnedMesh& skin) {
   Eigen::VectorXi bones(skin.vertices.cols());
   for (Eigen::Index v = 0; v < bones.size(); ++v) {

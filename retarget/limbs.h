@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "retarget/clip.h"
+#include "retarget/contacts.h"
 
 namespace hydrostat::retarget {
 
@@ -12,6 +13,9 @@ using LimbTable = Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic>;
 /// Bones belong to different limbs where neither is the other's ancestor and the way between them along the skeleton is four
 /// bones or longer. Bones of different roots are not told apart.
 LimbTable bones_of_different_limbs(const Skeleton& skeleton);
+
+/// Marks the patches whose bones belong to another limb than that of some other patch: a worm has none.
+void find_legs(const Skeleton& skeleton, ContactSchedule& contacts);
 
 /// The bone of greatest weight of each skin vertex, the first of equals; V.
 Eigen::VectorXi dominant_bones(const SkinnedMesh& skin);

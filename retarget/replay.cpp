@@ -132,7 +132,7 @@ void Run::look_at_contacts() {
       contact_.bearing[point] = bears;
       touches = touches || contact_.touching[point] != ContactState::kOff;
     }
-    if (!touches) contact_.in_air.push_back(&plan.patches[k]);
+    if (plan.patches[k].on_leg && !touches) contact_.in_air.push_back(&plan.patches[k]);
   }
 }
 

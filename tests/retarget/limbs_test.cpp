@@ -22,6 +22,31 @@ TEST(Limbs, BonesOfDifferentRootsAreNotToldApart) {
   EXPECT_FALSE(bones_of_different_limbs(skeleton_of({-1, 0, 1, -1, 3, 4}, places)).any());
 }
 
+ContactSchedule schedule_of(const std::vector<std::string>& bones) {
+  ContactSchedule contacts;
+  for (const std::string& bone : bones) contacts.patches.push_back({bone, {}});
+  return contacts;
+}
+
+TEST(Limbs, PatchesOfDifferentLimbsAreOnLegs) {
+  const Skeleton skeleton = two_legged(0.1).skeleton;
+  ContactSchedule feet = schedule_of({skeleton.names[0], skeleton.names[2], skeleton.names[4]});
+  find_legs(skeleton, feet);
+  EXPECT_FALSE(feet.patches[0].on_leg);
+  EXPECT_TRUE(feet.patches[1].on_leg);
+  EXPECT_TRUE(feet.patches[2].on_leg);
+  ContactSchedule one = schedule_of({skeleton.names[2]});
+  find_legs(skeleton, one);
+  EXPECT_FALSE(one.patches[0].on_leg);
+}
+
+TEST(Limbs, AWormHasNoLegs) {
+  const Skeleton skeleton = worm().skeleton;
+  ContactSchedule segments = schedule_of(skeleton.names);
+  find_legs(skeleton, segments);
+  for (const Patch& patch : segments.patches) EXPECT_FALSE(patch.on_leg);
+}
+
 TEST(Limbs, TheDominantBoneHasTheGreatestWeight) {
   SkinnedMesh skin;
   skin.vertices.resize(3, 2);

@@ -140,10 +140,10 @@ class ActiveVariation {
         variation_(block, element, x, active_.inverse(), hourglass_of(shape_)) {}
 
   /// Derivative of the nodes' forces with respect to the shape's coordinates [N, N/m].
-  Eigen::Matrix<double, Dim * Nodes, Shape::kSize> forces() const {
+  Eigen::MatrixXd forces() const {
     const GradientDerivative<Dim> moduli = variation_.moduli(Definiteness::kExact);
     const typename Variation::Weights weights = variation_.node_weights();
-    Eigen::Matrix<double, Dim * Nodes, Shape::kSize> result;
+    Eigen::MatrixXd result(Dim * Nodes, Shape::kSize);
     for (int c = 0; c < Shape::kSize; ++c) {
       const Square undo = undo_of(c);
       typename Variation::Change change;
@@ -168,8 +168,8 @@ class ActiveVariation {
   }
 
   /// Derivative of the energy with respect to the shape's coordinates [J, N].
-  Eigen::Matrix<double, 1, Shape::kSize> energy() const {
-    Eigen::Matrix<double, 1, Shape::kSize> result;
+  Eigen::RowVectorXd energy() const {
+    Eigen::RowVectorXd result(Shape::kSize);
     for (int c = 0; c < kStrains<Dim>; ++c) result[c] = variation_.stress().cwiseProduct(variation_.F() * undo_of(c)).sum();
     if constexpr (kModes > 0) {
       for (int k = 0; k < Dim * kModes; ++k) result[kStrains<Dim> + k] = -variation_.hourglass_force()(k);

@@ -42,8 +42,11 @@ void find_legs(const Skeleton& skeleton, ContactSchedule& contacts) {
     return std::find(skeleton.names.begin(), skeleton.names.end(), patch.name) - skeleton.names.begin();
   };
   for (Patch& patch : contacts.patches) {
-    patch.on_leg = std::any_of(contacts.patches.begin(), contacts.patches.end(),
-                               [&](const Patch& other) { return different(bone_of(patch), bone_of(other)); });
+    const auto a = bone_of(patch);
+    patch.on_leg = std::any_of(contacts.patches.begin(), contacts.patches.end(), [&](const Patch& other) {
+      const auto b = bone_of(other);
+      return different(a, b) && (different.col(a) && different.col(b)).any();
+    });
   }
 }
 

@@ -14,7 +14,8 @@ using LimbTable = Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic>;
 /// bones or longer. Bones of different roots are not told apart.
 LimbTable bones_of_different_limbs(const Skeleton& skeleton);
 
-/// Marks the patches whose bones belong to another limb than that of some other patch: a worm has none.
+/// Marks the patches on legs: their bone, that of another patch and a third bone are of three limbs. A chain has two at most, to either
+/// side of its root.
 void find_legs(const Skeleton& skeleton, ContactSchedule& contacts);
 
 /// The bone of greatest weight of each skin vertex, the first of equals; V.

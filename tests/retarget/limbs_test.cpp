@@ -29,7 +29,7 @@ ContactSchedule schedule_of(const std::vector<std::string>& bones) {
 }
 
 TEST(Limbs, PatchesOfDifferentLimbsAreOnLegs) {
-  const Skeleton skeleton = two_legged(0.1).skeleton;
+  const Skeleton skeleton = skeleton_of({-1, 0, 1, 0, 3, 0, 5}, std::vector<Eigen::Vector3d>(7, Eigen::Vector3d::Zero()));  // two legs, a spine
   ContactSchedule feet = schedule_of({skeleton.names[0], skeleton.names[2], skeleton.names[4]});
   find_legs(skeleton, feet);
   EXPECT_FALSE(feet.patches[0].on_leg);
@@ -40,11 +40,13 @@ TEST(Limbs, PatchesOfDifferentLimbsAreOnLegs) {
   EXPECT_FALSE(one.patches[0].on_leg);
 }
 
-TEST(Limbs, AWormHasNoLegs) {
-  const Skeleton skeleton = worm().skeleton;
-  ContactSchedule segments = schedule_of(skeleton.names);
-  find_legs(skeleton, segments);
-  for (const Patch& patch : segments.patches) EXPECT_FALSE(patch.on_leg);
+TEST(Limbs, AChainHasNoLegsWhereverItsRootIs) {
+  const std::vector<Eigen::Vector3d> places(9, Eigen::Vector3d::Zero());
+  for (const Skeleton& skeleton : {worm().skeleton, skeleton_of({-1, 0, 1, 2, 3, 0, 5, 6, 7}, places)}) {
+    ContactSchedule segments = schedule_of(skeleton.names);
+    find_legs(skeleton, segments);
+    for (const Patch& patch : segments.patches) EXPECT_FALSE(patch.on_leg);
+  }
 }
 
 TEST(Limbs, TheDominantBoneHasTheGreatestWeight) {

@@ -231,7 +231,8 @@ class SceneReader {
     retarget::distort<Dim>(start_shape, scene_.seed, start.x);
     const VectorOf<Dim> velocity = body.numbers_or("velocity_m_s", VectorOf<Dim>::Zero()), centre = physics::centre_of_mass(scene.body, start.x);
     start.v = velocity.replicate(1, start.x.cols());
-    for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += spin_velocity(body, start.x.col(i) - centre);
+    const physics::SpinOf<Dim> rate = spin_of(body);
+    for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += physics::turning<Dim>(rate, start.x.col(i) - centre);
     retarget::hold_at(scenario_.clamps, 0, scene.body.held);
     for (const int node : scene.body.held) start.v.col(node).setZero();
     return start_shape;
@@ -252,12 +253,12 @@ class SceneReader {
     scenario_.self_contact_reason = std::move(plan.reason);
   }
 
-  static VectorOf<Dim> spin_velocity(const TomlReader& body, const VectorOf<Dim>& arm) {
+  /// [1/s]
+  static physics::SpinOf<Dim> spin_of(const TomlReader& body) {
     if constexpr (Dim == 2) {
-      return radians(body.number_or("spin_deg_s", 0)) * VectorOf<Dim>(-arm.y(), arm.x());
+      return physics::SpinOf<Dim>(radians(body.number_or("spin_deg_s", 0)));
     } else {
-      const Eigen::Vector3d spin = body.numbers_or("spin_deg_s", Eigen::Vector3d::Zero());
-      return radians(1) * spin.cross(arm);
+      return radians(1) * body.numbers_or("spin_deg_s", Eigen::Vector3d::Zero());
     }
   }
 

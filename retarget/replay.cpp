@@ -12,17 +12,6 @@
 namespace hydrostat::retarget {
 namespace {
 
-/// The velocity [m/s] that all pushes together give between two times: each counts with the share of its duration that lies
-/// there.
-Eigen::Vector3d pushed_velocity(const std::vector<Push>& pushes, double begin, double end) {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  for (const Push& push : pushes) {
-    const double seconds = std::min(end, push.time_s + push.duration_s) - std::max(begin, push.time_s);
-    if (seconds > 0) velocity += seconds / push.duration_s * push.delta_v;
-  }
-  return velocity;
-}
-
 /// 0 where a patch is meant to slide, 1 elsewhere.
 double planned_grip(const PreparedTarget& prepared, double time_s) {
   const auto frame = static_cast<std::size_t>(frame_at(prepared.target, time_s));

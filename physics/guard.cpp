@@ -9,15 +9,15 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr double kFaster = 1.25;   // kinetic energy over that at the start and the work [-]: less is not looked into
-constexpr double kCalm = 0.01;     // of the energy of a body as fast as push_out_speed: less is never too much
-constexpr int kMostHalvings = 6;   // of euler's step where its solver finds no end
+constexpr double kFaster = 1.25;  // kinetic energy over that at the start and the work [-]: less is not looked into
+constexpr double kCalm = 0.01;    // of the energy of a body as fast as push_out_speed: less is never too much
+constexpr int kMostHalvings = 6;  // of euler's step where its solver finds no end
 
 /// An accurate method with euler behind it: sound steps are the accurate method's own, to the bit.
 ///
-/// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed shapes
-/// and keeps linear momentum. The angular momentum that it loses in flight is given back as a turn of the whole body, as far as the
-/// energy that it took away reaches: forces inside the body, which have no sum, for theirs had a moment.
+/// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed
+/// shapes and keeps linear momentum. The angular momentum that it loses in flight is given back as a turn of the whole body,
+/// as far as the energy that it took away reaches: forces inside the body, which have no sum, for theirs had a moment.
 /// Source: Dinev, Liu, Kavan, "Stabilizing integrators for real-time physics", TOG 37(1), 2018, section 4, whose measure of
 /// soundness is the energy, too.
 template <int Dim>
@@ -78,7 +78,8 @@ class GuardedStepper final : public StepperOf<Dim> {
     if (parts == 1) return stepper.step(dt, activation, effect_force, state, impulses);
     clear(impulses);
     for (int k = 0; k < parts; ++k) {
-      if (stepper.step(dt / parts, activation, effect_force, state, part_) != Termination::kDone) return Termination::kDiverged;
+      if (stepper.step(dt / parts, activation, effect_force, state, part_) != Termination::kDone)
+        return Termination::kDiverged;
       add(part_, impulses);
     }
     return Termination::kDone;
@@ -90,8 +91,8 @@ class GuardedStepper final : public StepperOf<Dim> {
     return work + 0.5 * impulses.effect_nodes.cwiseProduct(start_.v + state.v).sum();
   }
 
-  /// Adds the turn about the centre of mass that takes the angular momentum to what the start and the booked moments make it, as
-  /// far as the energy stays below the start's and the work.
+  /// Adds the turn about the centre of mass that takes the angular momentum to what the start and the booked moments make
+  /// it, as far as the energy stays below the start's and the work.
   void turn_on(const Eigen::VectorXd& activation, const ImpulsesOf<Dim>& impulses, StateOf<Dim>& state) {
     const BodyOf<Dim>& body = scene_.body;
     const VectorOf<Dim> origin = VectorOf<Dim>::Zero(), centre = centre_of_mass(body, state.x);
@@ -114,7 +115,8 @@ class GuardedStepper final : public StepperOf<Dim> {
     if (!std::isfinite(after) || has_inverted(state.x)) return false;
     if (after <= kFaster * before + std::max(0.0, work) + calm_energy_) return true;
     if (!forces_.set_activation(activation)) return false;
-    const double elastic = forces_.elastic_energy(start_.x), gain = after + forces_.elastic_energy(state.x) - before - elastic;
+    const double elastic = forces_.elastic_energy(start_.x),
+                 gain = after + forces_.elastic_energy(state.x) - before - elastic;
     return gain <= work + options_.growth * (before + elastic) + calm_energy_;
   }
 
@@ -159,8 +161,8 @@ std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, 
   return std::make_unique<GuardedStepper<Dim>>(scene, std::move(accurate), options);
 }
 template std::unique_ptr<StepperOf<2>> make_guarded_stepper<2>(const SceneOf<2>&, std::unique_ptr<StepperOf<2>>,
-                                                                    const GuardOptions&);
+                                                               const GuardOptions&);
 template std::unique_ptr<StepperOf<3>> make_guarded_stepper<3>(const SceneOf<3>&, std::unique_ptr<StepperOf<3>>,
-                                                                    const GuardOptions&);
+                                                               const GuardOptions&);
 
 }  // namespace hydrostat::physics

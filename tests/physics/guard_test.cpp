@@ -120,7 +120,8 @@ METHOD_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
 
 /// A turning bar in flight, stretched by a tenth, whose elastic and kinetic energy are about the same.
 SceneOf<2> flying_bar() {
-  return in_the_air(make_body(element_bar<2>({8, 2}, {1, 0.25}, Cut::kTwoTriangles, {1000, 5e5, 0.4}), ElementBodyOptions{}), false);
+  return in_the_air(make_body(element_bar<2>({8, 2}, {1, 0.25}, Cut::kTwoTriangles, {1000, 5e5, 0.4}), ElementBodyOptions{}),
+                    false);
 }
 
 TEST(Guard, KeepsTheAngularMomentumOfFreeFlightAndGainsNoEnergyByIt) {
@@ -156,9 +157,11 @@ TEST(Guard, TriesAStepAgainInShorterOnesWhereToldTo) {
   const BodyOf<2>& body = scene.body;
   for (const int most_parts : {1, 2, 4}) {
     int calls = 0;
-    const auto in_the_third = [&](StateOf<2>&) { return ++calls == 3 || calls == 4 ? Termination::kDiverged : Termination::kDone; };
-    const std::unique_ptr<StepperOf<2>> stepper =
-        make_guarded_stepper<2>(scene, std::make_unique<Spoilt<2>>(scene, in_the_third), {.growth = 8, .most_parts = most_parts});
+    const auto in_the_third = [&](StateOf<2>&) {
+      return ++calls == 3 || calls == 4 ? Termination::kDiverged : Termination::kDone;
+    };
+    const std::unique_ptr<StepperOf<2>> stepper = make_guarded_stepper<2>(
+        scene, std::make_unique<Spoilt<2>>(scene, in_the_third), {.growth = 8, .most_parts = most_parts});
     ImpulsesOf<2> impulses = make_impulses(scene);
     StateOf<2> state{body.rest, rigid_velocity<2>(body, body.rest, {1, 2}, SpinOf<2>(6))};
     const PointsOf<2> push = PointsOf<2>::Constant(2, body.node_count(), 3);

@@ -16,8 +16,9 @@ constexpr int kMostHalvings = 6;  // of euler's step where its solver finds no e
 /// An accurate method with euler behind it: sound steps are the accurate method's own, to the bit.
 ///
 /// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed
-/// shapes and keeps linear momentum. The angular momentum that it loses in flight is given back as a turn of the whole body,
-/// as far as the energy that it took away reaches: forces inside the body, which have no sum, for theirs had a moment.
+/// shapes and keeps linear momentum. What angular momentum it loses in flight, a fault of its
+/// own, a turn of the whole body gives back, as far as the energy that it took away reaches; a turn about the centre of mass
+/// has no momentum, so that what is booked goes on to balance.
 /// Source: Dinev, Liu, Kavan, "Stabilizing integrators for real-time physics", TOG 37(1), 2018, section 4, whose measure of
 /// soundness is the energy, too.
 template <int Dim>

@@ -1,6 +1,10 @@
 #include "io/scene_body.h"
 
+#include <algorithm>
+#include <functional>
 #include <nlohmann/json.hpp>
+
+#include "retarget/body_material.h"
 
 namespace hydrostat::io {
 namespace {
@@ -17,6 +21,26 @@ Json list(const Eigen::Matrix<Scalar, Rows, Eigen::Dynamic>& values) {
   Json all = Json::array();
   for (const auto& column : values.colwise()) all.push_back(std::vector<Scalar>(column.begin(), column.end()));
   return all;
+}
+
+/// A number, or where the elements differ in it one each.
+Json of_materials(const std::vector<physics::ElementMaterial>& materials, double physics::ElementMaterial::*number) {
+  std::vector<double> all;
+  for (const physics::ElementMaterial& material : materials) all.push_back(material.*number);
+  if (std::adjacent_find(all.begin(), all.end(), std::not_equal_to<>()) == all.end()) return all.front();
+  return all;
+}
+
+/// As a creature's body file has them (body_file.h).
+template <int Dim>
+void put_elements(const physics::BodyElements<Dim>& elements, Json& json) {
+  json["elements"] = Json::array();
+  for (const auto nodes : elements.block.nodes.colwise()) json["elements"].push_back(std::vector<int>(nodes.begin(), nodes.end()));
+  json["element_fill"] = list(elements.fill);
+  json["law"] = name_of(retarget::material_of(elements.block.law));
+  json["density_kg_m3"] = of_materials(elements.materials, &physics::ElementMaterial::density);
+  json["youngs_modulus_pa"] = of_materials(elements.materials, &physics::ElementMaterial::youngs_modulus);
+  json["poissons_ratio"] = of_materials(elements.materials, &physics::ElementMaterial::poissons_ratio);
 }
 
 /// Contact points are nodes of the surface: the one of greatest weight.
@@ -129,6 +153,7 @@ std::string scene_body_text(const retarget::ScenarioOf<Dim>& scenario) {
   json["rest_length_m"] = list(body.rest_length);
   json["edge_stiffness_n_m"] = list(body.edge_stiffness);
   json["edge_damping_n_s_m"] = list(body.edge_damping);
+  if (!body.elements.empty()) put_elements(body.elements.front(), json);
   json["contact_points"] = {{"nodes", list(scene.contact_points.nodes)},
                             {"weights", list(scene.contact_points.weights)},
                             {"faces", list(scene.contact_faces)}};

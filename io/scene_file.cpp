@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "io/fingerprint.h"
 #include "io/scene_shapes.h"
 #include "io/toml_reader.h"
 #include "physics/element_body.h"
+#include "physics/element_calibration.h"
 #include "retarget/self_contact_plan.h"
 
 namespace hydrostat::io {
@@ -38,7 +40,7 @@ class SceneReader {
     if (!body) throw root_.refusal("", "there is no [body]", "Add [body] with shape = \"...\".");
     // A whole multiple of a power of two, so that places are taken off it and put back without rounding.
     scenario_.origin = kOrigins * (body->numbers_or("position_m", VectorOf<Dim>::Zero(), kPlace) / kOrigins).array().round();
-    mesh_ = body_mesh<Dim>(*body, scene_.shape, scene_.element, scene_.warnings);
+    mesh_ = body_mesh<Dim>(*body, scene_.shape, scene_.element, cells_, scene_.warnings);
     read_material();
     for (const TomlReader& wave : root_.tables("activation")) read_wave(wave);
     refuse_vanishing();
@@ -73,11 +75,18 @@ class SceneReader {
   void read_material() {
     physics::ElementMaterial most;
     double damping_time = physics::Material{}.damping_time;
+    bool is_calibrated = false;
     scene_.law = kLaws.front();
     if (const std::optional<TomlReader> table = root_.table("material")) {
       scene_.law = table->choice_or_first("law", kLaws);
       most = material_of(*table, most);
       damping_time = table->number_or("damping_time_s", damping_time, {.least = 0, .most = 1000});
+      is_calibrated = table->flag_or("calibrated", false);
+      if (is_calibrated && (scene_.law == kSprings || cells_.cols() == 0)) {
+        const std::string tets = Dim == 3 ? "tets" : "triangles";
+        throw table->refusal("calibrated", "only finite elements that are " + tets + " of a " + (Dim == 3 ? "cube" : "square") + " or bar are calibrated",
+                             "Give such a shape in " + tets + " with a law other than springs, or leave 'calibrated' out.");
+      }
       table->refuse_others();
     }
     const bool of_boxes = mesh_.nodes.rows() != Dim + 1;
@@ -97,6 +106,10 @@ class SceneReader {
     }
     const std::string broken = physics::broken_rule(mesh_);
     if (!broken.empty()) throw root_.refusal("body", broken, "Give other sizes, more 'nodes' or a smaller 'cell_size_m'.");
+    for (const physics::ElementMaterial& material : mesh_.materials) {
+      scenario_.youngs_modulus = std::max(scenario_.youngs_modulus, material.youngs_modulus);
+    }
+    if (is_calibrated) calibrate();
     if (scene_.law == kSprings) {
       scenario_.scene.body = retarget::make_spring_body<Dim>(mesh_, damping_time);
     } else {
@@ -104,11 +117,24 @@ class SceneReader {
           scene_.law == "stable_neo_hookean" ? physics::ElasticLaw::kStableNeoHookean : physics::ElasticLaw::kCorotatedLinear;
       scenario_.scene.body = physics::make_body<Dim>(mesh_, physics::ElementBodyOptions{law, 0, damping_time});
     }
-    for (const physics::ElementMaterial& material : mesh_.materials) {
-      scenario_.youngs_modulus = std::max(scenario_.youngs_modulus, material.youngs_modulus);
-    }
     scenario_.length = (mesh_.rest.rowwise().maxCoeff() - mesh_.rest.rowwise().minCoeff()).maxCoeff();
     scenario_.size = physics::size_of_volume<Dim>(scenario_.scene.body.rest_volume.sum());
+  }
+
+  /// The elements get less of Young's modulus, so that the body gives way as its cells would. How much hangs on Poisson's ratio,
+  /// which may differ from region to region.
+  void calibrate() {
+    std::map<double, double> factors;
+    for (physics::ElementMaterial& material : mesh_.materials) {
+      const auto [entry, is_new] = factors.try_emplace(material.poissons_ratio, 1);
+      if (is_new) {
+        physics::ElementMesh<Dim> tets = mesh_;
+        tets.materials.assign(1, material);
+        const physics::ElementMesh<Dim> boxes{mesh_.rest, cells_, tets.materials, Eigen::VectorXd::Ones(cells_.cols())};
+        entry->second = physics::unlocking_factor<Dim>(tets, boxes);
+      }
+      material.youngs_modulus *= entry->second;
+    }
   }
 
   void read_clamp(const TomlReader& table) {
@@ -231,7 +257,8 @@ class SceneReader {
     retarget::distort<Dim>(start_shape, scene_.seed, start.x);
     const VectorOf<Dim> velocity = body.numbers_or("velocity_m_s", VectorOf<Dim>::Zero()), centre = physics::centre_of_mass(scene.body, start.x);
     start.v = velocity.replicate(1, start.x.cols());
-    for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += spin_velocity(body, start.x.col(i) - centre);
+    const physics::SpinOf<Dim> rate = spin_of(body);
+    for (Eigen::Index i = 0; i < start.x.cols(); ++i) start.v.col(i) += physics::turning<Dim>(rate, start.x.col(i) - centre);
     retarget::hold_at(scenario_.clamps, 0, scene.body.held);
     for (const int node : scene.body.held) start.v.col(node).setZero();
     return start_shape;
@@ -252,12 +279,12 @@ class SceneReader {
     scenario_.self_contact_reason = std::move(plan.reason);
   }
 
-  static VectorOf<Dim> spin_velocity(const TomlReader& body, const VectorOf<Dim>& arm) {
+  /// [1/s]
+  static physics::SpinOf<Dim> spin_of(const TomlReader& body) {
     if constexpr (Dim == 2) {
-      return radians(body.number_or("spin_deg_s", 0)) * VectorOf<Dim>(-arm.y(), arm.x());
+      return physics::SpinOf<Dim>(radians(body.number_or("spin_deg_s", 0)));
     } else {
-      const Eigen::Vector3d spin = body.numbers_or("spin_deg_s", Eigen::Vector3d::Zero());
-      return radians(1) * spin.cross(arm);
+      return radians(1) * body.numbers_or("spin_deg_s", Eigen::Vector3d::Zero());
     }
   }
 
@@ -274,6 +301,7 @@ class SceneReader {
   const TomlReader& root_;
   SceneFile& scene_;
   physics::ElementMesh<Dim> mesh_;  // the rest shape in its own frame
+  Eigen::MatrixXi cells_;           // nodes of the boxes that its tets or triangles are cut from; may be empty
   ScenarioOf<Dim> scenario_;
   Eigen::VectorXd most_activation_;  // E
 };

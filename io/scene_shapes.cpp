@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "io/surface_mesh.h"
@@ -150,6 +152,19 @@ int count_pieces(const SimplexMeshOf<Dim>& mesh) {
   return pieces;
 }
 
+/// The boxes of a lattice, a step [m] apart, by the nodes of a mesh that stand where the lattice's do.
+template <int Dim>
+Eigen::MatrixXi cells_of_cut(const physics::BoxMeshOf<Dim>& lattice, const SimplexMeshOf<Dim>& mesh, const VectorOf<Dim>& step) {
+  const auto place_of = [&](const VectorOf<Dim>& x) {
+    std::array<long, Dim> place;
+    for (int d = 0; d < Dim; ++d) place[static_cast<std::size_t>(d)] = std::lround((x[d] - lattice.nodes(d, 0)) / step[d]);
+    return place;
+  };
+  std::map<std::array<long, Dim>, int> node_at;
+  for (int n = 0; n < mesh.nodes.cols(); ++n) node_at[place_of(mesh.nodes.col(n))] = n;
+  return lattice.boxes.unaryExpr([&](int node) { return node_at.at(place_of(lattice.nodes.col(node))); });
+}
+
 double turned_area(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
   return physics::cross<2>(b - a, c - a)[0];
 }
@@ -216,7 +231,7 @@ ClosedMeshOf<Dim> surface_of(const TomlReader& table) {
 }
 
 template <int Dim>
-physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, std::string& element,
+physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, std::string& element, Eigen::MatrixXi& cells,
                                     std::vector<std::string>& warnings) {
   shape = Dim == 3 ? body.choice("shape", {"cube", "bar", "sphere", "tetrahedron", "pyramid", "mesh"})
                    : body.choice("shape", {"square", "bar", "circle", "triangle", "pyramid", "outline"});
@@ -234,12 +249,11 @@ physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, 
     mesh = inside<Dim>(body, warnings);
   } else {
     const VectorOf<Dim> extents = shape == "bar" ? VectorOf<Dim>(body.numbers("size_m", Dim, kLength)) : size();
-    const Eigen::Matrix<int, Dim, 1> cells = cells_of_box<Dim>(body, extents);
-    if (of_boxes) {
-      const physics::BoxMeshOf<Dim> lattice = physics::lattice_of_box<Dim>(extents, cells);
-      return {lattice.nodes, lattice.boxes, {}, Eigen::VectorXd::Ones(lattice.boxes.cols())};
-    }
-    mesh = physics::mesh_of_box<Dim>(extents, cells);
+    const Eigen::Matrix<int, Dim, 1> counts = cells_of_box<Dim>(body, extents);
+    const physics::BoxMeshOf<Dim> lattice = physics::lattice_of_box<Dim>(extents, counts);
+    if (of_boxes) return {lattice.nodes, lattice.boxes, {}, Eigen::VectorXd::Ones(lattice.boxes.cols())};
+    mesh = physics::mesh_of_box<Dim>(extents, counts);
+    cells = cells_of_cut<Dim>(lattice, mesh, extents.cwiseQuotient(counts.template cast<double>()));
   }
   if (of_boxes) throw body.refusal("element", "only boxes can be cut into such elements, not a " + shape, "Leave 'element' out.");
   const double quality = physics::shape_qualities(mesh).minCoeff();
@@ -283,7 +297,7 @@ std::vector<char> points_within(const TomlReader& table, const PointsOf<Dim>& po
   template BlockOf<Dim> rotation_of<Dim>(const TomlReader&);                                                \
   template ClosedMeshOf<Dim> surface_of<Dim>(const TomlReader&);                                            \
   template physics::ElementMesh<Dim> body_mesh<Dim>(const TomlReader&, std::string&, std::string&,          \
-                                                    std::vector<std::string>&);                             \
+                                                    Eigen::MatrixXi&, std::vector<std::string>&);           \
   template std::vector<char> points_within<Dim>(const TomlReader&, const PointsOf<Dim>&);
 HYDROSTAT_INSTANTIATE(2)
 HYDROSTAT_INSTANTIATE(3)

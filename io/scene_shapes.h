@@ -21,11 +21,12 @@ template <int Dim>
 physics::ClosedMeshOf<Dim> surface_of(const TomlReader& table);
 
 /// The rest shape of [body] in its own frame, without materials. `shape` and `element` become their names ("sphere", "tet"),
-/// `warnings` receives what the mesh departs in. Throws Error where the shape is not told as it must be, gives slivers or falls
+/// `cells` the nodes of the boxes that its tets or triangles are cut from (2^Dim x C, as ElementMesh has them; empty where there are
+/// none), `warnings` receives what the mesh departs in. Throws Error where the shape is not told as it must be, gives slivers or falls
 /// into pieces.
 template <int Dim>
 physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, std::string& element,
-                                    std::vector<std::string>& warnings);
+                                    Eigen::MatrixXi& cells, std::vector<std::string>& warnings);
 
 /// Which points (Dim x P, in the body's own frame) lie in the part that `table` names: `box_m`, or `normal` with `offset_m`; all
 /// where it names none. Throws Error where no point does.

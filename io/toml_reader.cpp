@@ -153,6 +153,14 @@ long TomlReader::whole_or(const std::string& key, long otherwise, long least, lo
   return static_cast<long>(**whole);
 }
 
+bool TomlReader::flag_or(const std::string& key, bool otherwise) const {
+  const toml::node* node = find(key);
+  if (node == nullptr) return otherwise;
+  const auto* flag = node->as_boolean();
+  if (flag == nullptr) throw refusal(key, named(key) + " is " + kind_of(*node) + ", not true or false", "Give true or false.");
+  return **flag;
+}
+
 std::string TomlReader::text(const std::string& key) const {
   const toml::node& node = need(key);
   const auto* text = node.as_string();

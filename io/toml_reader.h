@@ -39,6 +39,7 @@ class TomlReader {
   double number(const std::string& key, const Within& within = kAny) const;
   double number_or(const std::string& key, double otherwise, const Within& within = kAny) const;
   long whole_or(const std::string& key, long otherwise, long least, long most) const;
+  bool flag_or(const std::string& key, bool otherwise) const;
   std::string text(const std::string& key) const;
   /// One of `choices`; the first where the key is missing.
   std::string choice_or_first(const std::string& key, const std::vector<std::string>& choices) const;

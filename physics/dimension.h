@@ -41,6 +41,16 @@ SpinOf<Dim> cross(const std::type_identity_t<VectorOf<Dim>>& a, const std::type_
   }
 }
 
+/// The velocity at `arm` from the centre of a turn of `rate` [1/s].
+template <int Dim>
+VectorOf<Dim> turning(const std::type_identity_t<SpinOf<Dim>>& rate, const std::type_identity_t<VectorOf<Dim>>& arm) {
+  if constexpr (Dim == 3) {
+    return rate.cross(arm);
+  } else {
+    return rate[0] * VectorOf<Dim>(-arm.y(), arm.x());
+  }
+}
+
 /// Length [m] of a cube or square of that volume.
 template <int Dim>
 double size_of_volume(double volume) {

@@ -9,25 +9,28 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr double kFaster = 1.25;   // kinetic energy over that at the start and the work [-]: less is not looked into
-constexpr double kCalm = 0.01;     // of the energy of a body as fast as push_out_speed: less is never too much
-constexpr int kMostHalvings = 6;   // of euler's step where its solver finds no end
+constexpr double kFaster = 1.25;  // kinetic energy over that at the start and the work [-]: less is not looked into
+constexpr double kCalm = 0.01;    // of the energy of a body as fast as push_out_speed: less is never too much
+constexpr int kMostHalvings = 6;  // of euler's step where its solver finds no end
 
 /// An accurate method with euler behind it: sound steps are the accurate method's own, to the bit.
 ///
-/// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed shapes
-/// and keeps linear momentum; the angular momentum that it loses is its own.
+/// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed
+/// shapes and keeps linear momentum. What angular momentum it loses in flight, a fault of its
+/// own, a turn of the whole body gives back, as far as the energy that it took away reaches; a turn about the centre of mass
+/// has no momentum, so that what is booked goes on to balance.
 /// Source: Dinev, Liu, Kavan, "Stabilizing integrators for real-time physics", TOG 37(1), 2018, section 4, whose measure of
 /// soundness is the energy, too.
 template <int Dim>
 class GuardedStepper final : public StepperOf<Dim> {
  public:
-  GuardedStepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate, double growth)
+  GuardedStepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate, const GuardOptions& options)
       : scene_(scene),
         accurate_(std::move(accurate)),
-        growth_(growth),
+        options_(options),
         forces_(scene.body),
         start_{scene.body.rest, scene.body.rest},
+        part_(make_impulses(scene)),
         calm_energy_(kCalm * 0.5 * scene.body.mass.sum() * std::pow(push_out_speed(scene), 2)) {}
 
   double substep(double dt) const override { return accurate_->substep(dt); }
@@ -44,12 +47,15 @@ class GuardedStepper final : public StepperOf<Dim> {
     start_ = state;
     const bool is_broken = (euler_ != nullptr && euler_->is_recovering()) || (starts_unknown_ && has_inverted(state.x));
     starts_unknown_ = false;
-    if (!is_broken && accurate_->step(dt, activation, effect_force, state, impulses) == Termination::kDone &&
-        is_sound(activation, state, impulses)) {
-      is_guarding_ = false;
-      return Termination::kDone;
+    for (int parts = 1; !is_broken && parts <= (is_guarding_ ? 1 : options_.most_parts); parts *= 2) {
+      if (parts > 1) accurate_->forget();
+      if (step_in_parts(*accurate_, parts, dt, activation, effect_force, state, impulses) == Termination::kDone &&
+          is_sound(activation, state, impulses)) {
+        is_guarding_ = false;
+        return Termination::kDone;
+      }
+      state = start_;
     }
-    state = start_;
     return take_over(dt, activation, effect_force, state, impulses);
   }
 
@@ -68,35 +74,62 @@ class GuardedStepper final : public StepperOf<Dim> {
     return 0.5 * state.v.colwise().squaredNorm().dot(scene_.body.mass);
   }
 
+  Termination step_in_parts(StepperOf<Dim>& stepper, int parts, double dt, const Eigen::VectorXd& activation,
+                            const PointsOf<Dim>* effect_force, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
+    if (parts == 1) return stepper.step(dt, activation, effect_force, state, impulses);
+    clear(impulses);
+    for (int k = 0; k < parts; ++k) {
+      if (stepper.step(dt / parts, activation, effect_force, state, part_) != Termination::kDone)
+        return Termination::kDiverged;
+      add(part_, impulses);
+    }
+    return Termination::kDone;
+  }
+
+  /// From the step's start to `state` [J], of what comes from without.
+  double work_on_body(const StateOf<Dim>& state, const ImpulsesOf<Dim>& impulses) const {
+    const double work = scene_.gravity.dot((state.x - start_.x) * scene_.body.mass) + impulses.obstacle_work;
+    return work + 0.5 * impulses.effect_nodes.cwiseProduct(start_.v + state.v).sum();
+  }
+
+  /// Adds the turn about the centre of mass that takes the angular momentum to what the start and the booked moments make
+  /// it, as far as the energy stays below the start's and the work.
+  void turn_on(const Eigen::VectorXd& activation, const ImpulsesOf<Dim>& impulses, StateOf<Dim>& state) {
+    const BodyOf<Dim>& body = scene_.body;
+    const VectorOf<Dim> origin = VectorOf<Dim>::Zero(), centre = centre_of_mass(body, state.x);
+    const SpinOf<Dim> missing = angular_momentum(body, start_.x, start_.v, origin) + impulses.gravity_moment +
+                                impulses.effect_moment - angular_momentum(body, state.x, state.v, origin);
+    const SpinOf<Dim> rate = inertia(body, state.x, centre).ldlt().solve(missing);
+    if (!rate.allFinite() || !forces_.set_activation(activation)) return;
+    const double spare = kinetic_energy(start_) + forces_.elastic_energy(start_.x) + work_on_body(state, impulses) -
+                         kinetic_energy(state) - forces_.elastic_energy(state.x);
+    if (!(spare > 0)) return;
+    // A part s of the turn brings in s b + s^2 a.
+    const double a = 0.5 * rate.dot(missing), b = rate.dot(angular_momentum(body, state.x, state.v, centre));
+    const double part = a + b <= spare ? 1 : 2 * spare / (b + std::sqrt(b * b + 4 * a * spare));
+    for (int i = 0; i < body.node_count(); ++i) state.v.col(i) += turning<Dim>(part * rate, state.x.col(i) - centre);
+  }
+
   bool is_sound(const Eigen::VectorXd& activation, const StateOf<Dim>& state, const ImpulsesOf<Dim>& impulses) {
     const double before = kinetic_energy(start_), after = kinetic_energy(state);
-    double work = scene_.gravity.dot((state.x - start_.x) * scene_.body.mass) + impulses.obstacle_work;
-    work += 0.5 * impulses.effect_nodes.cwiseProduct(start_.v + state.v).sum();
+    const double work = work_on_body(state, impulses);
     if (!std::isfinite(after) || has_inverted(state.x)) return false;
     if (after <= kFaster * before + std::max(0.0, work) + calm_energy_) return true;
     if (!forces_.set_activation(activation)) return false;
-    const double elastic = forces_.elastic_energy(start_.x), gain = after + forces_.elastic_energy(state.x) - before - elastic;
-    return gain <= work + growth_ * (before + elastic) + calm_energy_;
+    const double elastic = forces_.elastic_energy(start_.x),
+                 gain = after + forces_.elastic_energy(state.x) - before - elastic;
+    return gain <= work + options_.growth * (before + elastic) + calm_energy_;
   }
 
   Termination take_over(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                         ImpulsesOf<Dim>& impulses) {
-    if (euler_ == nullptr) {
-      euler_ = std::make_unique<RecoveringStepper<Dim>>(scene_, make_euler_stepper(scene_));
-      part_ = impulses;
-    }
+    if (euler_ == nullptr) euler_ = std::make_unique<RecoveringStepper<Dim>>(scene_, make_euler_stepper(scene_));
     ++guard_steps_;
     starts_unknown_ = true;
     for (int halvings = 0; halvings <= kMostHalvings; ++halvings) {
       if (!is_guarding_ || halvings > 0) euler_->forget();
-      const int parts = 1 << halvings;
-      clear(impulses);
-      Termination termination = Termination::kDone;
-      for (int k = 0; k < parts && termination == Termination::kDone; ++k) {
-        termination = euler_->step(dt / parts, activation, effect_force, state, part_);
-        add(part_, impulses);
-      }
-      if (termination == Termination::kDone) {
+      if (step_in_parts(*euler_, 1 << halvings, dt, activation, effect_force, state, impulses) == Termination::kDone) {
+        if (scene_.body.held.empty() && impulses.contact_nodes.isZero(0)) turn_on(activation, impulses, state);
         is_guarding_ = true;
         accurate_->forget();
         return Termination::kDone;
@@ -111,7 +144,7 @@ class GuardedStepper final : public StepperOf<Dim> {
   const SceneOf<Dim>& scene_;
   std::unique_ptr<StepperOf<Dim>> accurate_;
   std::unique_ptr<RecoveringStepper<Dim>> euler_;  // from its first step on
-  double growth_;  // of the energy [-] in a step beyond the work on the body
+  GuardOptions options_;
   InternalForces<Dim> forces_;
   StateOf<Dim> start_;
   ImpulsesOf<Dim> part_;
@@ -125,10 +158,12 @@ class GuardedStepper final : public StepperOf<Dim> {
 
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate,
-                                                     double growth) {
-  return std::make_unique<GuardedStepper<Dim>>(scene, std::move(accurate), growth);
+                                                     const GuardOptions& options) {
+  return std::make_unique<GuardedStepper<Dim>>(scene, std::move(accurate), options);
 }
-template std::unique_ptr<StepperOf<2>> make_guarded_stepper<2>(const SceneOf<2>&, std::unique_ptr<StepperOf<2>>, double);
-template std::unique_ptr<StepperOf<3>> make_guarded_stepper<3>(const SceneOf<3>&, std::unique_ptr<StepperOf<3>>, double);
+template std::unique_ptr<StepperOf<2>> make_guarded_stepper<2>(const SceneOf<2>&, std::unique_ptr<StepperOf<2>>,
+                                                               const GuardOptions&);
+template std::unique_ptr<StepperOf<3>> make_guarded_stepper<3>(const SceneOf<3>&, std::unique_ptr<StepperOf<3>>,
+                                                               const GuardOptions&);
 
 }  // namespace hydrostat::physics

@@ -28,16 +28,6 @@ BlockOf<Dim> rotation_of(const BlockOf<Dim>& covariance) {
   return u * svd.matrixV().transpose();
 }
 
-/// The velocity at `arm` from the centre of a turn of `rate` [1/s].
-template <int Dim>
-VectorOf<Dim> turning(const SpinOf<Dim>& rate, const VectorOf<Dim>& arm) {
-  if constexpr (Dim == 3) {
-    return rate.cross(arm);
-  } else {
-    return rate[0] * VectorOf<Dim>(-arm.y(), arm.x());
-  }
-}
-
 template <int Dim>
 SceneOf<Dim> without_self_contact(const SceneOf<Dim>& scene) {
   SceneOf<Dim> result = scene;

@@ -7,8 +7,8 @@ namespace {
 
 // Velocities half a substep beside the places let the energy of a mode at 0.8 of the stability bound swing between 1 / 1.8
 // and 1 / 0.2 of its mean.
-constexpr double kExplicitGrowth = 8;
-constexpr double kImplicitGrowth = 0.5;
+constexpr GuardOptions kExplicitGuard{.growth = 8};
+constexpr GuardOptions kImplicitGuard{.growth = 0.5, .most_parts = 4};
 
 }  // namespace
 
@@ -39,11 +39,11 @@ template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene) {
   switch (method) {
     case Method::kExplicit:
-      return make_guarded_stepper(scene, make_explicit_stepper(scene), kExplicitGrowth);
+      return make_guarded_stepper(scene, make_explicit_stepper(scene), kExplicitGuard);
     case Method::kEuler:
       return std::make_unique<RecoveringStepper<Dim>>(scene, make_euler_stepper(scene));
     case Method::kImplicit:
-      return make_guarded_stepper(scene, make_implicit_stepper(scene), kImplicitGrowth);
+      return make_guarded_stepper(scene, make_implicit_stepper(scene), kImplicitGuard);
     case Method::kXpbd:
       return make_xpbd_stepper(scene);
     case Method::kSpring:

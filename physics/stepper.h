@@ -38,12 +38,16 @@ std::optional<Method> method_named(const std::string& name);
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& scene);
 
+struct GuardOptions {
+  double growth;       // of the energy [-] in a step beyond the work on the body, that the method's own velocities show when all is well
+  int most_parts = 1;  // a power of two: in two, four ... parts up to it a step is tried again that follows a sound one
+};
 /// A step of `accurate` that ends with an inverted tet, with much more energy than was there or was brought in, or with what
-/// is no number is taken again by euler, and so is every step from a state with an inverted tet. `growth` [-]: of the energy in
-/// a step beyond the work on the body, that the accurate method's own velocities show when all is well.
+/// is no number is tried again in shorter ones, where the options say so, and then taken again by euler, and so is every step
+/// from a state with an inverted tet.
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate,
-                                                     double growth);
+                                                     const GuardOptions& options);
 
 /// Its steps diverge where the stability bound asks for more than `most_substeps`.
 template <int Dim>

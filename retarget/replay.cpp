@@ -12,17 +12,6 @@
 namespace hydrostat::retarget {
 namespace {
 
-/// The velocity [m/s] that all pushes together give between two times: each counts with the share of its duration that lies
-/// there.
-Eigen::Vector3d pushed_velocity(const std::vector<Push>& pushes, double begin, double end) {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  for (const Push& push : pushes) {
-    const double seconds = std::min(end, push.time_s + push.duration_s) - std::max(begin, push.time_s);
-    if (seconds > 0) velocity += seconds / push.duration_s * push.delta_v;
-  }
-  return velocity;
-}
-
 Eigen::Map<const Eigen::VectorXd> column(const Eigen::Matrix3Xd& points) { return {points.data(), points.size()}; }
 
 /// The target's first state; what is played once begins at rest.

@@ -5,17 +5,11 @@
 
 #include "retarget/corrector.h"
 #include "retarget/prepare.h"
+#include "retarget/push.h"
 #include "retarget/run_report.h"
 #include "retarget/trace.h"
 
 namespace hydrostat::retarget {
-
-/// A declared effect: a uniform force on all nodes that would change the body's velocity by delta_v within duration_s.
-struct Push {
-  double time_s = 0;
-  double duration_s = 0.1;
-  Eigen::Vector3d delta_v = Eigen::Vector3d::Zero();  // [m/s]
-};
 
 struct ReplayOptions {
   double duration_s = 9;

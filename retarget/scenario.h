@@ -6,6 +6,7 @@
 #include "physics/element_block.h"
 #include "physics/simplex_mesh.h"
 #include "physics/stepper.h"
+#include "retarget/push.h"
 
 namespace hydrostat::retarget {
 
@@ -17,13 +18,6 @@ struct Wave {
   double frequency_hz = 0;
   bool is_square = false;  // the sign of the sine in its place
   double from_s = 0, until_s = 1e300;
-};
-
-/// A declared effect: a uniform force on all nodes that would change the body's velocity by delta_v within duration_s.
-template <int Dim>
-struct PushOf {
-  double time_s = 0, duration_s = 0.1;
-  physics::VectorOf<Dim> delta_v = physics::VectorOf<Dim>::Zero();  // [m/s]
 };
 
 /// An obstacle's velocity for a while; out of all its moves it stands still. Moves at one time add.

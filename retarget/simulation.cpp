@@ -57,18 +57,6 @@ double penetration(const physics::SceneOf<Dim>& scene, const physics::StateOf<Di
   return deepest;
 }
 
-/// The velocity [m/s] that all pushes together give between two times: each counts with the share of its duration that lies
-/// there.
-template <int Dim>
-VectorOf<Dim> pushed_velocity(const std::vector<PushOf<Dim>>& pushes, double begin, double end) {
-  VectorOf<Dim> velocity = VectorOf<Dim>::Zero();
-  for (const PushOf<Dim>& push : pushes) {
-    const double seconds = std::min(end, push.time_s + push.duration_s) - std::max(begin, push.time_s);
-    if (seconds > 0) velocity += seconds / push.duration_s * push.delta_v;
-  }
-  return velocity;
-}
-
 /// What a row of the trace sums up over its steps.
 template <int Dim>
 struct RowSums {

@@ -28,6 +28,7 @@ using physics::Method;
 
 constexpr physics::ElementMaterial kMaterial{1000, 5e5, 0.4};
 constexpr int kReferenceRate = 19200;  // [1/s] steps of explicit
+constexpr double kSameScheme = 0.05;   // [-] of an error: beyond it Bullet's material is not ours
 constexpr int kCrossCheckRate = 960;   // [1/s] steps of implicit, beside the reference
 
 /// Runs of a row, the best of which counts: the shorter it is, the more of it others on the machine can spoil.
@@ -242,6 +243,10 @@ bool tell_goals(const std::vector<Row>& rows) {
       at_most("cantilever: time of explicit over Bullet's at 60 Hz", tets, times_of_bullet(rows, row),
               tets < 5000 ? 1.0 / 8 : 1.0 / 7);
       at_most("cantilever: error of explicit over Bullet's at 60 Hz", tets, row.verdict.error / peer->verdict.error, 0.01);
+      const Row* const same = find(rows, "cantilever", tets, "euler", 60);
+      if (same == nullptr) continue;
+      at_most("cantilever: how far Bullet's error is from that of euler, the same scheme of the same material [-]", tets,
+              std::abs(peer->verdict.error / same->verdict.error - 1), kSameScheme);
     }
   }
   return all;

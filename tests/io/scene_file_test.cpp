@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "io/import_worker.h"
+#include "io/scene_body.h"
 #include "io/write_file.h"
 #include "retarget/simulation.h"
 #include "tests/io/refusal.h"
@@ -158,6 +161,69 @@ TEST_F(SceneFiles, MakeBodiesOfEveryElementAndLaw) {
   EXPECT_TRUE(scenario<3>(bar3 + springs).scene.body.elements.empty());
 }
 
+TEST_F(SceneFiles, CalibrateTetsSoThatTheySagAsTheConvergedBar) {
+  const std::string bar = "gravity_m_s2 = [0, -9.81, 0]\n[body]\nshape = \"bar\"\nsize_m = [1.0, 0.25, 0.25]\ncell_size_m = 0.125\n"
+                          "[[clamp]]\nnormal = [-1, 0, 0]\noffset_m = 0.499\n[material]\nyoungs_modulus_pa = 5e7\n"
+                          "law = \"stable_neo_hookean\"\ndamping_time_s = 0.01\ncalibrated = ";
+  const double converged = 4.79e-3;  // [m] CalculiX 2.20: C3D8I of 24 x 6 x 6 cells
+  for (const bool is_calibrated : {false, true}) {
+    const auto scene = scenario<3>(bar + (is_calibrated ? "true\n" : "false\n"));
+    EXPECT_EQ(scene.youngs_modulus, 5e7);
+    retarget::SimulationOptions options;
+    options.method = physics::Method::kEuler;
+    options.dt_s = 0.1;
+    options.duration_s = 3;
+    const retarget::Motion motion = retarget::simulate(scene, options).motion;
+    const auto end = motion.at(motion.count() - 1);
+    double sum = 0;
+    int count = 0;
+    for (Eigen::Index n = 0; n < scene.start.x.cols(); ++n) {
+      if (scene.start.x(0, n) < 0.499) continue;
+      sum += scene.start.x(1, n) - end(1, n);
+      ++count;
+    }
+    if (is_calibrated) {
+      EXPECT_NEAR(sum / count, converged, 0.1 * converged);
+    } else {
+      EXPECT_LT(sum / count, 0.7 * converged);
+    }
+  }
+}
+
+TEST_F(SceneFiles, CalibrateEveryRegionByItsOwnPoissonsRatio) {
+  const std::string square = "dimension = 2\n[body]\nshape = \"bar\"\nsize_m = [1.0, 0.2]\ncell_size_m = 0.1\n[material]\nlaw = \"corotated_linear\"\n"
+                             "poissons_ratio = 0.3\ncalibrated = ";
+  const std::string region = "[[region]]\nnormal = [1, 0]\nyoungs_modulus_pa = 1e5\npoissons_ratio = 0.45\n";
+  const auto plain = scenario<2>(square + "false\n" + region), calibrated = scenario<2>(square + "true\n" + region);
+  std::map<double, double> factors;
+  for (std::size_t t = 0; t < 40; ++t) {
+    const physics::ElementMaterial& before = plain.scene.body.elements[0].materials[t];
+    const physics::ElementMaterial& after = calibrated.scene.body.elements[0].materials[t];
+    EXPECT_EQ(before.poissons_ratio, after.poissons_ratio);
+    factors.try_emplace(before.poissons_ratio, after.youngs_modulus / before.youngs_modulus);
+    EXPECT_NEAR(after.youngs_modulus / before.youngs_modulus, factors[before.poissons_ratio], 1e-12);
+  }
+  ASSERT_EQ(factors.size(), 2U);
+  EXPECT_LT(factors[0.45], factors[0.3]);  // the nearer to incompressible, the more they lock
+  EXPECT_LT(factors[0.3], 1);
+}
+
+TEST_F(SceneFiles, WriteTheElementsAndTheirMaterials) {
+  const std::string cube = "[body]\nshape = \"cube\"\nsize_m = 1\ncell_size_m = 0.5\n[material]\nlaw = \"corotated_linear\"\n";
+  for (const bool has_region : {false, true}) {
+    const auto scene = scenario<3>(cube + (has_region ? "[[region]]\nnormal = [1, 0, 0]\ndensity_kg_m3 = 5\n" : ""));
+    const nlohmann::json json = nlohmann::json::parse(scene_body_text(scene));
+    EXPECT_EQ(json.at("elements").size(), 40U);
+    EXPECT_EQ(json.at("elements")[7], std::vector<int>(scene.scene.body.tets.col(7).begin(), scene.scene.body.tets.col(7).end()));
+    EXPECT_EQ(json.at("element_fill"), std::vector<double>(40, 1));
+    EXPECT_EQ(json.at("law"), "corotated_linear");
+    EXPECT_EQ(json.at("youngs_modulus_pa"), 2e6);
+    EXPECT_EQ(json.at("poissons_ratio"), 0.4);
+    EXPECT_EQ(json.at("density_kg_m3").is_array(), has_region);
+  }
+  EXPECT_FALSE(nlohmann::json::parse(scene_body_text(scenario<3>("[body]\nshape = \"cube\"\nsize_m = 1\n"))).contains("elements"));
+}
+
 TEST_F(SceneFiles, ClampWhatLiesWithin) {
   const auto bar = scenario<3>(
       "[body]\nshape = \"bar\"\nsize_m = [1.0, 0.2, 0.2]\ncell_size_m = 0.1\nrotation_deg = [0, 0, 90]\nvelocity_m_s = [1, 0, 0]\n"
@@ -283,6 +349,10 @@ TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[[push]]\ntime_s = 1\n", "line 4", "'delta_v_m_s' of [[push]] is missing", ""},
            {"[body]\nshape = \"sphere\"\nsize_m = 1\nelement = \"hex\"\n", "line 4", "only boxes", "Leave 'element' out"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\nelement = \"hex\"\n[material]\nlaw = \"springs\"\n", "line 5", "springs need tets", "another law"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\ncalibrated = true\n", "line 5", "only finite elements that are tets of a cube or bar", "law other than springs"},
+           {"[body]\nshape = \"sphere\"\nsize_m = 1\n[material]\nlaw = \"corotated_linear\"\ncalibrated = true\n", "line 6", "only finite elements", "or leave 'calibrated' out"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\nelement = \"hex\"\n[material]\nlaw = \"corotated_linear\"\ncalibrated = true\n", "line 7", "only finite elements", "in tets"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\ncalibrated = 1\n", "line 5", "'calibrated' of [material] is ", "Give true or false"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nlaw = \"neo_hookean\"\n", "line 5", "none of ", "Did you mean 'stable_neo_hookean'?"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[[clamp]]\nnormal = [0, 0, 0]\n", "line 5", "has no direction", ""},
            {"method = \"magic\"\n[body]\nshape = \"cube\"\nsize_m = 1\n", "line 1", "'method' is 'magic'", ""},

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "physics/internal_forces.h"
 #include "tests/physics/element_method_scene.h"
 
 namespace hydrostat::physics {
@@ -103,7 +104,7 @@ METHOD_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
     int steps = 0;
     const auto in_the_fifth = [&](StateOf<Dim>& state) { return ++steps == 5 ? spoil(state) : Termination::kDone; };
     const std::unique_ptr<StepperOf<Dim>> stepper =
-        make_guarded_stepper<Dim>(scene, std::make_unique<Spoilt<Dim>>(scene, in_the_fifth), 8);
+        make_guarded_stepper<Dim>(scene, std::make_unique<Spoilt<Dim>>(scene, in_the_fifth), {.growth = 8});
     ImpulsesOf<Dim> impulses = make_impulses(scene);
     StateOf<Dim> state = laid_down(scene, 0.001);
     state.v.row(1).setConstant(-1);
@@ -114,6 +115,64 @@ METHOD_TEST(Guard, TakesStepsAgainThatGainEnergyOrInvertOrAreNoNumber) {
       EXPECT_EQ(stepper->guard_steps(), k < 4 ? 0 : 1);
     }
     EXPECT_GT(jacobians(body, state.x).minCoeff(), 0);
+  }
+}
+
+/// A turning bar in flight, stretched by a tenth, whose elastic and kinetic energy are about the same.
+SceneOf<2> flying_bar() {
+  return in_the_air(make_body(element_bar<2>({8, 2}, {1, 0.25}, Cut::kTwoTriangles, {1000, 5e5, 0.4}), ElementBodyOptions{}),
+                    false);
+}
+
+TEST(Guard, KeepsTheAngularMomentumOfFreeFlightAndGainsNoEnergyByIt) {
+  const SceneOf<2> scene = flying_bar();
+  const BodyOf<2>& body = scene.body;
+  for (unsigned seed = 0; seed < trials(5u); ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto never = [](StateOf<2>&) { return Termination::kDiverged; };
+    const std::unique_ptr<StepperOf<2>> stepper =
+        make_guarded_stepper<2>(scene, std::make_unique<Spoilt<2>>(scene, never), {.growth = 8});
+    ImpulsesOf<2> impulses = make_impulses(scene);
+    StateOf<2> state{body.rest, rigid_velocity<2>(body, body.rest, {1, 2}, SpinOf<2>(6))};
+    state.x.row(0) *= 1.1;
+    state.v += random_points<2>(random, body.node_count(), 0.2);
+    InternalForces<2> forces(body);
+    ASSERT_TRUE(forces.set_activation(passive(body)));
+    for (int k = 0; k < 24; ++k) {
+      const StateOf<2> before = state;
+      ASSERT_EQ(stepper->step(kDt, passive(body), nullptr, state, impulses), Termination::kDone);
+      const SpinOf<2> spin = angular_momentum(body, before.x, before.v, VectorOf<2>::Zero());
+      EXPECT_LT((angular_momentum(body, state.x, state.v, VectorOf<2>::Zero()) - spin).norm(), 1e-9 * spin.norm()) << k;
+      EXPECT_LT(momentum_residual(scene, before, state, impulses, kDt), 1e-6) << k;
+      const double energy_before = kinetic_energy(body, before.v) + forces.elastic_energy(before.x);
+      EXPECT_LT(kinetic_energy(body, state.v) + forces.elastic_energy(state.x), (1 + 1e-12) * energy_before) << k;
+    }
+    EXPECT_EQ(stepper->guard_steps(), 24);
+  }
+}
+
+TEST(Guard, TriesAStepAgainInShorterOnesWhereToldTo) {
+  const SceneOf<2> scene = flying_bar();
+  const BodyOf<2>& body = scene.body;
+  for (const int most_parts : {1, 2, 4}) {
+    int calls = 0;
+    const auto in_the_third = [&](StateOf<2>&) {
+      return ++calls == 3 || calls == 4 ? Termination::kDiverged : Termination::kDone;
+    };
+    const std::unique_ptr<StepperOf<2>> stepper = make_guarded_stepper<2>(
+        scene, std::make_unique<Spoilt<2>>(scene, in_the_third), {.growth = 8, .most_parts = most_parts});
+    ImpulsesOf<2> impulses = make_impulses(scene);
+    StateOf<2> state{body.rest, rigid_velocity<2>(body, body.rest, {1, 2}, SpinOf<2>(6))};
+    const PointsOf<2> push = PointsOf<2>::Constant(2, body.node_count(), 3);
+    for (int k = 0; k < 3; ++k) {
+      const StateOf<2> before = state;
+      ASSERT_EQ(stepper->step(kDt, passive(body), &push, state, impulses), Termination::kDone);
+      EXPECT_LT((impulses.effect_nodes - kDt * push).norm(), 1e-12) << most_parts << " parts";
+      EXPECT_LT(momentum_residual(scene, before, state, impulses, kDt), 1e-6);
+    }
+    EXPECT_EQ(stepper->guard_steps(), most_parts == 4 ? 0 : 1);
+    EXPECT_EQ(calls, most_parts == 1 ? 3 : most_parts == 2 ? 4 : 8);  // wholes, one half, four quarters
   }
 }
 

@@ -144,16 +144,6 @@ SpinOf<Dim> random_spin(std::mt19937& random, double amplitude) {
   return random_points<3>(random, 1, amplitude).template bottomRows<SpinOf<Dim>::RowsAtCompileTime>();
 }
 
-/// The velocity at `arm` from the centre of a turn of `rate` [1/s].
-template <int Dim>
-VectorOf<Dim> turning(const SpinOf<Dim>& rate, const VectorOf<Dim>& arm) {
-  if constexpr (Dim == 3) {
-    return rate.cross(arm);
-  } else {
-    return rate[0] * VectorOf<Dim>(-arm.y(), arm.x());
-  }
-}
-
 /// Turning about the centre of mass, which drifts.
 template <int Dim>
 PointsOf<Dim> rigid_velocity(const BodyOf<Dim>& body, const PointsOf<Dim>& x, const VectorOf<Dim>& drift,

@@ -6,13 +6,15 @@
 namespace hydrostat::retarget {
 
 void cone_rows(const physics::Scene& scene, const std::vector<ContactState>& touching, const std::vector<bool>& bearing,
-               const Eigen::Matrix3Xd& force, const Eigen::MatrixXd& approach, const Eigen::VectorXd& now, Eigen::MatrixXd& rows) {
+               const Eigen::Matrix3Xd& force, const Eigen::MatrixXd& approach, const Eigen::VectorXd& now,
+               Eigen::MatrixXd& rows) {
   const physics::ContactPoints& points = scene.contact_points;
   const Eigen::Index muscles = approach.cols();
   const Eigen::Vector3d normal = scene.ground.normal, side = normal.unitOrthogonal(), other = normal.cross(side);
   Eigen::Matrix<double, 5, 3> faces;
-  faces << normal.transpose(), (scene.ground.friction * normal + side).transpose(), (scene.ground.friction * normal - side).transpose(),
-      (scene.ground.friction * normal + other).transpose(), (scene.ground.friction * normal - other).transpose();
+  faces << normal.transpose(), (scene.ground.friction * normal + side).transpose(),
+      (scene.ground.friction * normal - side).transpose(), (scene.ground.friction * normal + other).transpose(),
+      (scene.ground.friction * normal - other).transpose();
   const auto faces_of = [&](int p) -> Eigen::Index {
     const auto k = static_cast<std::size_t>(p);
     if (touching[k] == ContactState::kOff || !bearing[k]) return 0;
@@ -37,15 +39,19 @@ void cone_rows(const physics::Scene& scene, const std::vector<ContactState>& tou
   }
 }
 
-Eigen::VectorXd solve_within_cones(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& b, const Eigen::MatrixXd& rows, double weight) {
+Eigen::VectorXd solve_within_cones(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& b, const Eigen::MatrixXd& rows,
+                                   double weight) {
   constexpr int kTurns = 50, kHalvings = 30;
   constexpr double kDescent = 1e-4;  // of the slope, that a step has to bring
   const Eigen::Index muscles = hessian.rows();
   Eigen::VectorXd w = hessian.selfadjointView<Eigen::Lower>().llt().solve(b);
   if (rows.rows() == 0 || weight == 0) return w;
-  const auto margins = [&](const Eigen::VectorXd& at) -> Eigen::VectorXd { return rows.leftCols(muscles) * at + rows.col(muscles); };
+  const auto margins = [&](const Eigen::VectorXd& at) -> Eigen::VectorXd {
+    return rows.leftCols(muscles) * at + rows.col(muscles);
+  };
   const auto cost = [&](const Eigen::VectorXd& at, const Eigen::VectorXd& margin) {
-    return 0.5 * at.dot(hessian.selfadjointView<Eigen::Lower>() * at) - b.dot(at) + 0.5 * weight * weight * margin.cwiseMin(0).squaredNorm();
+    return 0.5 * at.dot(hessian.selfadjointView<Eigen::Lower>() * at) - b.dot(at) +
+           0.5 * weight * weight * margin.cwiseMin(0).squaredNorm();
   };
   Eigen::VectorXd margin = margins(w);
   double here = cost(w, margin);

@@ -96,8 +96,8 @@ void Corrector::respond(const physics::State& state, const physics::State& refer
   forces_.add_elastic_forces(state.x, force_);
   forces_.add_elastic_forces(reference.x, reference_force_);
   for (int i = 0; i < body.node_count(); ++i) {
-    response_.col(muscles).segment<3>(3 * i) =
-        body.mass[i] * (state.v.col(i) - reference.v.col(i)) + options_.horizon_s * (force_.col(i) - reference_force_.col(i));
+    response_.col(muscles).segment<3>(3 * i) = body.mass[i] * (state.v.col(i) - reference.v.col(i)) +
+                                               options_.horizon_s * (force_.col(i) - reference_force_.col(i));
   }
   matrix_.solve_in_place(response_);
 }
@@ -133,12 +133,14 @@ void Corrector::weigh_momentum(const physics::State& state, double grip) {
 }
 
 /// The mean of each foot in the air, on its way to where it can catch the body.
-void Corrector::weigh_feet(const physics::State& state, const physics::State& reference, const std::vector<const Patch*>& in_air) {
+void Corrector::weigh_feet(const physics::State& state, const physics::State& reference,
+                           const std::vector<const Patch*>& in_air) {
   const physics::Body& body = scene_.body;
   const Eigen::Vector3d up = scene_.ground.normal, com = physics::centre_of_mass(body, reference.x);
   const double height = std::max(0.0, up.dot(com) - scene_.ground.offset), gravity = scene_.gravity.norm();
   const double ahead_s = gravity > 0 ? options_.step_ahead * std::sqrt(height / gravity) : 0;
-  const Eigen::Vector3d ahead = physics::centre_of_mass(body, state.x) - com + ahead_s * (state.v - reference.v) * body.mass / body.mass.sum();
+  const Eigen::Vector3d ahead =
+      physics::centre_of_mass(body, state.x) - com + ahead_s * (state.v - reference.v) * body.mass / body.mass.sum();
   const Eigen::Vector3d step = options_.step * (ahead - up.dot(ahead) * up);
   const Eigen::Index last = response_.cols() - 1;
   Eigen::Index row = 3 * body.node_count() + 6;

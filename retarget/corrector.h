@@ -27,31 +27,33 @@ struct ContactNow {
   Eigen::Matrix3Xd force;              // 3 x P [N], of the control step before
   std::vector<bool> bearing;           // P: by plan it bears load now and until the horizon's end
   std::vector<const Patch*> in_air;    // patches on legs that touch nothing; they must outlive the call
-  double grip = 1;                     // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
-                                       // friction sets the ground's sideways force, and pushing harder only slips more
+  double grip = 1;  // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
+                    // friction sets the ground's sideways force, and pushing harder only slips more
 };
 
 /// Feedback on the muscles in deviation form: nothing on the nominal path.
 ///
-/// dv_free = A^-1 [M ev + Th (f_int(x; a_ff) - f_int(x_ref; a_ff))], A = M + Th D + Th^2 (K + Kc on the points that touch now),
-/// min_w |W (dv_free + A^-1 Th B Phi w + ex / tau)|^2 + eps |w|^2 + eps_d |w - w_previous|^2 + the squared excess of contact forces over
-/// their cones (contact_cones.h). W weighs the nodes by mass, the six rows of momentum, and the mean of each foot in the air, which is
-/// sent to where the centre of mass can be caught: its error moves by e + c sqrt(h / g) e' with the error e of the centre of mass over
-/// the ground and its height h.
-/// Sources: the design, section 8; Raibert, "Legged Robots That Balance", 1986, chapter 2, for the placement of feet by speed; Pratt et al.,
-/// "Capture Point: A Step toward Humanoid Push Recovery", Humanoids 2006, equation 5, for the way that sqrt(h / g) gives.
+/// dv_free = A^-1 [M ev + Th (f_int(x; a_ff) - f_int(x_ref; a_ff))], A = M + Th D + Th^2 (K + Kc on the points that touch
+/// now), min_w |W (dv_free + A^-1 Th B Phi w + ex / tau)|^2 + eps |w|^2 + eps_d |w - w_previous|^2 + the squared excess of
+/// contact forces over their cones (contact_cones.h). W weighs the nodes by mass, the six rows of momentum, and the mean of
+/// each foot in the air, which is sent to where the centre of mass can be caught: its error moves by e + c sqrt(h / g) e'
+/// with the error e of the centre of mass over the ground and its height h. Sources: the design, section 8; Raibert, "Legged
+/// Robots That Balance", 1986, for the placement of feet by speed; Pratt et al., "Capture Point: A Step toward Humanoid Push
+/// Recovery", Humanoids 2006, for the way that sqrt(h / g) gives.
 class Corrector {
  public:
   /// length [m] is L. Scene and muscles must outlive the corrector.
-  Corrector(const physics::Scene& scene, const Muscles& muscles, double length, double limit, const CorrectorOptions& options);
+  Corrector(const physics::Scene& scene, const Muscles& muscles, double length, double limit,
+            const CorrectorOptions& options);
 
-  /// Adds the correction to `activation` (E, the feed-forward on entry), clamped to the limit. Returns the RMS of the muscles'
-  /// correction.
-  double correct(const physics::State& state, const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation);
+  /// Adds the correction to `activation` (E, the feed-forward on entry), clamped to the limit. Returns the RMS of the
+  /// muscles' correction.
+  double correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
+                 Eigen::VectorXd& activation);
   void reset() { previous_.setZero(); }
   const Eigen::VectorXd& muscles_now() const { return previous_; }
-  /// How far inside their cones the forces at bearing points stay over the horizon, by the last correction's own model [m g]; negative
-  /// outside, 0 where nothing bears.
+  /// How far inside their cones the forces at bearing points stay over the horizon, by the last correction's own model [m
+  /// g]; negative outside, 0 where nothing bears.
   double least_margin() const;
 
  private:

@@ -26,7 +26,8 @@ Eigen::MatrixXd random_matrix(std::mt19937& random, Eigen::Index rows, Eigen::In
 
 Problem random_problem(unsigned seed) {
   std::mt19937 random(seed);
-  const Eigen::Index muscles = 1 + static_cast<Eigen::Index>(random() % 12), sides = static_cast<Eigen::Index>(random() % 30);
+  const Eigen::Index muscles = 1 + static_cast<Eigen::Index>(random() % 12),
+                     sides = static_cast<Eigen::Index>(random() % 30);
   const Eigen::MatrixXd root = random_matrix(random, muscles, muscles);
   Problem problem;
   problem.hessian = root * root.transpose() + 0.1 * Eigen::MatrixXd::Identity(muscles, muscles);
@@ -52,7 +53,8 @@ TEST(ContactCones, NothingChangesInsideTheCones) {
     Problem p = random_problem(seed);
     const Eigen::VectorXd free = p.hessian.llt().solve(p.b);
     p.rows.col(p.b.size()) = Eigen::VectorXd::Constant(p.rows.rows(), 0.01) - p.rows.leftCols(p.b.size()) * free;
-    EXPECT_EQ(solve_within_cones(p.hessian, p.b, p.rows, kWeight), solve_within_cones(p.hessian, p.b, Eigen::MatrixXd(0, p.b.size() + 1), kWeight));
+    EXPECT_EQ(solve_within_cones(p.hessian, p.b, p.rows, kWeight),
+              solve_within_cones(p.hessian, p.b, Eigen::MatrixXd(0, p.b.size() + 1), kWeight));
   }
 }
 

@@ -22,11 +22,12 @@ struct Gate {
   double least_travel, most_travel;     // over the clip's own
   double drift;                         // [per L a cycle] at most
   double apex;                          // of a jump: at most so far from the clip's rise, as a share of it; 0: not in the air
+  bool walks_on_legs;                   // all that touches the ground
 };
 constexpr Gate kGates[] = {
-    {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.85, 1.15, 0.04, 0},
-    {"boxdog_trot.fbx", "loop", true, 14.99, 0.01, 0.04, 0.92, 1.08, 0.003, 0},
-    {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.25},
+    {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.85, 1.15, 0.04, 0, false},
+    {"boxdog_trot.fbx", "loop", true, 14.99, 0.01, 0.04, 0.92, 1.08, 0.003, 0, true},
+    {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.25, true},
 };
 // Of the inverse dynamics, on every sample.
 constexpr double kMiss = 3e-4, kRootResidual = 0.01, kSaturated = 0.05;
@@ -114,6 +115,9 @@ void expect_gate(const fs::path& creature, const Gate& gate) {
   EXPECT_GE(travel, gate.least_travel);
   EXPECT_LE(travel, gate.most_travel);
   EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), gate.drift);
+  const json body = json::parse(io::read_file(creature / "body.json"));
+  ASSERT_FALSE(body.at("patches").empty());
+  for (const json& patch : body["patches"]) EXPECT_EQ(patch.at("on_leg"), gate.walks_on_legs) << patch["name"];
 }
 
 /// Leaves the ground with all feet for most of the time that the clip is in the air, flies as a stone does, and as high as the clip.

@@ -8,6 +8,7 @@
 #include "retarget/fall.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
+#include "retarget/stride_feedback.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -60,6 +61,7 @@ class Run {
   const std::unique_ptr<physics::Stepper> stepper_;
   Corrector corrector_;
   ReferenceGlide glide_;
+  StrideFeedback stride_;
 
   double time_s_ = 0, busy_s_ = 0, correction_ = 0;
   physics::State state_, reference_, glided_;
@@ -90,6 +92,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       stepper_(physics::make_stepper(options.method, input.scene)),
       corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
+      stride_(input.prepared, input.length, input.scene.body.edge_count(), input.feed_forward),
       state_(first_state(target_, curve_)),
       activation_(input.scene.body.edge_count()),
       mean_activation_(activation_.size()),
@@ -139,8 +142,10 @@ void Run::control() {
   glided_ = reference_;
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
+  stride_.follow(fit_.mean_a, fit_.mean_b, control_s_);
   look_at_contacts();
   input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
+  stride_.apply(activation_);
   feedback_ = -activation_;
   correction_ = corrector_.correct(state_, glided_, contact_, activation_);
   feedback_ += activation_;
@@ -150,6 +155,7 @@ void Run::control() {
 /// by friction. Feedback comes at once, for what comes later balances worse.
 void Run::activate(double share_of_step) {
   input_.feed_forward(time_s_ + share_of_step * control_s_, activation_);
+  stride_.apply(activation_);
   activation_ += feedback_;
   activation_ = activation_.cwiseMax(1 - input_.limit).cwiseMin(1 + input_.limit);
 }

@@ -3,7 +3,6 @@
 #include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -13,7 +12,6 @@
 #include "cli/command_line.h"
 #include "cli/import_options.h"
 #include "io/import_worker.h"
-#include "io/read_scene.h"
 #include "io/write_file.h"
 
 namespace hydrostat::cli {
@@ -73,12 +71,7 @@ int bench_import(const ImportBench& command) {
       clips.push_back(given);
       continue;
     }
-    std::vector<std::string> found;
-    for (const auto& entry : fs::directory_iterator(given)) {
-      if (io::is_clip_file(entry.path().string())) found.push_back(entry.path().string());
-    }
-    std::sort(found.begin(), found.end());
-    clips.insert(clips.end(), found.begin(), found.end());
+    for (const fs::path& file : clip_files(given)) clips.push_back(file.string());
   }
   for (const std::string& clip : clips) {
     const std::string line = row(clip, command.import);

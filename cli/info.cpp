@@ -9,7 +9,6 @@
 #include "cli/import_options.h"
 #include "cli/subcommands.h"
 #include "io/import.h"
-#include "io/read_scene.h"
 
 namespace hydrostat::cli {
 
@@ -23,6 +22,8 @@ struct InfoOptions {
   io::ImportOptions import;
 };
 
+constexpr double kStill = 1e-6;  // [m/s]
+
 void print_clip(const io::ClipInfo& clip) {
   const Eigen::Vector3d size = clip.bbox.front().max - clip.bbox.front().min;
   std::printf("clip %d '%s': %.3f s (%.3f s of keys at %.4g Hz), starts %.4g x %.4g x %.4g m\n", clip.index,
@@ -35,6 +36,8 @@ void print_clip(const io::ClipInfo& clip) {
               100 * clip.closure_defect_length);
   if (clip.in_place) {
     std::printf("  in place: its feet slide at %.3g m/s, the speed to give it back (--root-motion)\n", clip.foot_speed_m_s);
+  } else if (clip.speed_m_s < kStill) {
+    std::puts("  stays where it is");
   } else {
     std::printf("  travels at %.3g m/s\n", clip.speed_m_s);
   }
@@ -63,19 +66,6 @@ void print(const io::FileInfo& info) {
   }
   for (const io::ClipInfo& clip : info.clips) print_clip(clip);
   for (const std::string& warning : info.warnings) std::printf("warning: %s\n", warning.c_str());
-}
-
-/// The clip files of a directory, by name.
-std::vector<fs::path> clip_files(const fs::path& directory) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(directory)) {
-    if (entry.is_regular_file() && io::is_clip_file(entry.path().string())) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  if (files.empty())
-    throw Error(directory.string(), "", "holds no clip file",
-                "Give a file or a directory with .fbx, .glb, .gltf, .dae or .bvh files");
-  return files;
 }
 
 void print_row(const io::FileInfo& info) {
@@ -127,7 +117,8 @@ void add_info(CLI::App& app, int& exit_code) {
   add_import_options(*info, options->import);
   info->add_flag("--json", options->json, "Schema hydrostat.info/1 (hydrostat.info_table/1) instead of text");
   info->callback([options, &exit_code] {
-    if (fs::is_directory(options->clip_file)) {
+    std::error_code ignored;
+    if (fs::is_directory(options->clip_file, ignored)) {
       exit_code = tell_directory(*options);
       return;
     }

@@ -20,7 +20,7 @@ void set_import_worker_executable(const std::string& path);
 /// What a reading cost.
 struct ReadCost {
   double wall_s = 0, cpu_s = 0;  // start, reading and passing on
-  double peak_mib = 0;           // of the reading process's resident memory [2^20 bytes]
+  double peak_mib = 0;           // of the reading process's resident memory [2^20 bytes], and at least of ours as it started
 };
 
 /// Reads a clip file in a process of its own, under limits of memory and time, which may read nothing else on the disk and

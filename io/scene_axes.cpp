@@ -92,7 +92,7 @@ void guess_unit(Scene& scene, const std::vector<Eigen::Matrix3Xd>& frames) {
     scene.metres_per_unit = usual == kUnits.end() ? kPerson / height : usual->first;
     unit = usual == kUnits.end() ? "such that a person of 1.7 m stands there" : usual->second;
   }
-  std::array<char, 200> text{};
+  std::array<char, 320> text{};
   std::snprintf(text.data(), text.size(),
                 "A BVH file tells no unit: its numbers are taken to be %s (%.4g m each), for the first pose is %.4g of them "
                 "high, which "

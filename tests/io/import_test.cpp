@@ -462,7 +462,6 @@ std::vector<GoldenFile> golden_files() {
                                             {"fbx/robot_same_names.fbx", 0.0121},
                                             {"fbx/maya_sausage_3_takes.fbx", 0.0121},
                                             {"fbx/max_transformed_skin_zup.fbx", 0.08},  // two keys, 3.3 s apart
-                                            {"fbx/maya_pivot_offset.fbx", 0.16},         // two or three keys in 5 s
                                             {"fbx/maya_slime.fbx", 0.25}};               // a second body that nothing moves
   const nlohmann::json golden = nlohmann::json::parse(std::ifstream(assets() + "/golden_bbox.json"));
   for (const auto& [name, file] : golden.at("files").items()) {

@@ -11,8 +11,11 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "io/import_worker.h"
+#include "tests/io/refusal.h"
+#include "tests/io/temporary_directory.h"
 
 namespace hydrostat::io {
 namespace {
@@ -119,10 +122,24 @@ TEST(ReadInWorker, LeavesNoZombieAndIsCheapOnASmallFile) {
   set_import_worker_executable(HYDROSTAT_BINARY);
 }
 
+/// One turning bone; each frame takes 12 bytes of text.
+void write_long_bvh(const std::string& path, int frames) {
+  std::ofstream file(path);
+  file << "HIERARCHY\nROOT hip\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+          "End Site\n{\nOFFSET 0 1 0\n}\n}\nMOTION\nFrames: "
+       << frames << "\nFrame Time: 0.01\n";
+  for (int frame = 0; frame < frames; ++frame) file << "0.5 0.5 0.5\n";
+}
+
 TEST(ReadInWorker, IsRefusedPastItsMemory) {
+  const TemporaryDirectory directory;
+  const std::string path = (directory.path / "long.bvh").string();
+  write_long_bvh(path, 500000);
   ReadLimits limits;
-  limits.memory_gib = 0.02;
-  EXPECT_THROW(read_in_worker(kSamples + "/worm_crawl.glb", limits), Error);
+  limits.memory_gib = 0.05;
+  const std::string said = refusal([&] { read_in_worker(path, limits); });
+  EXPECT_NE(said.find("takes more than 0.05 GiB of memory"), std::string::npos) << said;
+  EXPECT_NE(said.find("--import-memory"), std::string::npos) << said;
 }
 
 }  // namespace

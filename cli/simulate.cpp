@@ -15,6 +15,7 @@
 #include "io/report.h"
 #include "io/simulation_files.h"
 #include "io/trace_writer.h"
+#include "retarget/accuracy.h"
 
 namespace hydrostat::cli {
 
@@ -160,7 +161,7 @@ int simulate(const SimulateCommand& command) {
         refuse_large_trace(command, options, body.node_count(), body.edge_count());
         // A second thread measures the error meanwhile; without one it is done when it is asked for.
         std::future<double> error = std::async(command.threads > 1 ? std::launch::async : std::launch::deferred,
-                                               [alone = scenario, &options] { return retarget::substep_error(alone, options); });
+                                               [alone = scenario, &options] { return retarget::estimated_error(alone, options); });
         scenario.scene.threads = std::max(1, command.threads - 1);
         retarget::Simulation run = stages.run("simulation", [&] { return retarget::simulate(scenario, options); });
         stages.run("measurement", [&] {

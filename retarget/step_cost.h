@@ -1,0 +1,13 @@
+#pragma once
+
+#include "physics/stepper.h"
+
+namespace hydrostat::retarget {
+
+/// What work on a scene's body is worth [ms]: counts times a table of constants that was measured once (step_cost.cpp), so
+/// that a choice by it hangs on the scene alone, never on the clock. Effects and contact are not in it: every method has the
+/// same.
+template <int Dim>
+double counted_ms(const physics::SceneOf<Dim>& scene, const physics::StepWork& work);
+
+}  // namespace hydrostat::retarget

@@ -10,9 +10,10 @@ namespace hydrostat::physics {
 /// water feels Archimedes' force in the middle of its volume, to rounding. Resistance is that of faces that move against the
 /// fluid, quadratic in their speed: rho / 2 times a coefficient, times their area, along the normal and, with another one,
 /// along the face (a slender body that waves thus swims). It is taken at the start of a step and shortened so that no step
-/// turns a velocity around. The fluid itself does not move, nor does the mass of what flows along with the body count.
+/// turns a velocity around. Its flow does not heed the body, nor does the mass of what is
+/// carried along with the body count.
 /// Source: Gray, Hancock, "The propulsion of sea-urchin spermatozoa", J. Exp. Biol. 32, 1955 (two coefficients), with the
-/// quadratic law of Taylor, "Analysis of the swimming of long and narrow animals", Proc. R. Soc. A 214, 1952, eq. (2.1).
+/// quadratic law of Taylor, "Analysis of the swimming of long and narrow animals", Proc. R. Soc. A 214, 1952.
 template <int Dim>
 class FluidEffect final : public EffectOf<Dim> {
  public:

@@ -29,7 +29,8 @@ struct Cost {
            boxes * counts.boxes + pairs * counts.pairs;
   }
 };
-// Medians on one thread at 2 GHz (Debian 12, g++ 12, -O3), bodies of 80 to 800 nodes.
+// Estimates for one thread at 2 GHz, from the times of tets, substeps and steps in README's "Speed against accuracy"; not yet
+// fitted to runs of their own.
 constexpr Cost kPass[] = {{12, 13, 12, 12, 45, 0}, {16, 17, 26, 24, 260, 0}};
 constexpr Cost kSweep[] = {{25, 40, 45, 100, 400, 0}, {30, 45, 80, 170, 1700, 0}};
 constexpr Cost kAssembly[] = {{20, 60, 120, 500, 2200, 10}, {40, 110, 400, 1300, 22000, 20}};

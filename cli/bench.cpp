@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "cli/bench_import.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
 #include "cli/progress.h"
@@ -132,6 +133,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   CLI::App* bench = app.add_subcommand("bench", "Measure what simulation costs on this machine");
   bench->require_subcommand(1);
   add_scaling(*bench, exit_code);
+  add_bench_import(*bench, exit_code);
 }
 
 }  // namespace hydrostat::cli

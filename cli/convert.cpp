@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "cli/import_options.h"
 #include "cli/number_option.h"
 #include "cli/outcome.h"
 #include "cli/stages.h"
@@ -40,6 +41,7 @@ struct ConvertOptions {
   unsigned seed = 0;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   bool calibrated = false, json = false, quiet = false;
+  io::ImportOptions import;
 };
 
 constexpr double kLeastLimit = 0.01, kMostLimit = 0.9;
@@ -108,8 +110,9 @@ retarget::CreatureOptions creature_options(const ConvertOptions& options) {
 
 io::ImportedCharacter import(const ConvertOptions& options) {
   io::ImportedCharacter imported;
-  const double rate_hz = retarget::CreatureOptions().rate_hz;
-  imported.character = io::import_character(options.clip_file, options.clip, {rate_hz}, &imported.warnings);
+  io::ImportOptions import_options = options.import;
+  import_options.sample_rate_hz = retarget::CreatureOptions().rate_hz;
+  imported.character = io::import_character(options.clip_file, options.clip, import_options, &imported.warnings);
   return imported;
 }
 
@@ -209,6 +212,10 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
                      {"method", report.accuracy.method},
                      {"friction", options.friction},
                      {"seed", std::int64_t{options.seed}}};
+  for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
+  if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
+  if (!options.import.up.empty()) record.settings.emplace_back("up", options.import.up);
+  if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
 }
@@ -382,6 +389,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   convert_command->add_option("CLIP", options->clip_file, "FBX, glTF, ... with a skeleton, a skin and a clip")->required();
   convert_command->add_option("-o,--out", options->out, "Directory of the creature")->required();
   convert_command->add_option("--clip", options->clip, "Clip by name or index [the first that lasts]");
+  add_import_options(*convert_command, options->import);
   convert_command->add_option("--height", options->height, "Height of the bind pose [m]; otherwise the file's")
       ->check(number_within(0.01, 1000));
   convert_command->add_option("--nodes", options->nodes, "Wished number of control nodes; otherwise what fits the body")

@@ -4,14 +4,20 @@
 #include <array>
 #include <cmath>
 
+#include "io/capsules.h"
 #include "io/clip_range.h"
 #include "io/import_worker.h"
+#include "io/read_chosen_parts.h"
 #include "io/rig.h"
+#include "io/scene_axes.h"
 #include "io/scene_pose.h"
+#include "io/scene_selection.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
 namespace {
+
+constexpr double kMostPoses = 4e6;  // of bones, over all frames: half a gigabyte
 
 /// Of the 24 turns that take axes to axes the one nearest to a matrix.
 Eigen::Matrix3d nearest_axis_turn(const Eigen::Matrix3d& wanted) {
@@ -65,7 +71,8 @@ void make_bone_space_rigid(retarget::Skeleton& skeleton, retarget::Clip& clip) {
   }
 }
 
-retarget::Clip sample(const Rig& rig, const Scene& scene, std::size_t index, const ImportOptions& options) {
+retarget::Clip sample(const Rig& rig, const Scene& scene, std::size_t index, const ImportOptions& options,
+                      const std::string& path) {
   const SceneClip& source = scene.clips[index];
   const ClipRange range = range_of(source);
   retarget::Clip clip;
@@ -76,31 +83,48 @@ retarget::Clip sample(const Rig& rig, const Scene& scene, std::size_t index, con
   clip.key_rate_hz = range.key_rate_hz;
   const int intervals = std::max(2, static_cast<int>(std::lround(options.sample_rate_hz * clip.range_s)));
   clip.rate_hz = intervals / clip.range_s;
+  if (static_cast<double>(intervals) * static_cast<double>(rig.scene_nodes.size()) > kMostPoses) {
+    throw Error(path, "clip '" + clip.name + "'", "it is too long for so many bones", "Cut it into shorter clips");
+  }
   for (int f = 0; f <= intervals; ++f) {
     clip.bone_pose.push_back(bone_poses(rig, scene, source, range.start_s + clip.range_s * f / intervals));
   }
   return clip;
 }
 
+void require_finite(const retarget::Character& character, const std::string& path) {
+  bool finite = character.skin.vertices.allFinite();
+  for (const std::vector<Eigen::Affine3d>& frame : character.clip.bone_pose) {
+    for (const Eigen::Affine3d& pose : frame) finite = finite && pose.matrix().allFinite();
+  }
+  if (!finite)
+    throw Error(path, "clip '" + character.clip.name + "'", "its transforms overflow", "Export it anew in a sane scale");
+}
+
 }  // namespace
+
+Scene read_chosen_parts(const std::string& path, const ImportOptions& options) {
+  Scene scene = read_in_worker(path, options.limits);
+  settle_axes(scene, options.up, options.metres_per_unit);
+  select_parts(scene, options.meshes, options.root, path);
+  return scene;
+}
 
 retarget::Character import_character(const std::string& path, const std::string& clip, const ImportOptions& options,
                                      std::vector<std::string>* warnings) {
-  const Scene scene = read_in_worker(path);
+  const Scene scene = read_chosen_parts(path, options);
   const std::size_t chosen = choose_clip(scene, clip, path);
   Rig rig = build_rig(scene, path);
-  if (rig.skin.vertices.cols() == 0) {
-    throw Error(path, "meshes", "it has a skeleton and no skinned mesh",
-                "Export the character's mesh with its skin beside the skeleton");
-  }
   retarget::Character character;
-  character.clip = sample(rig, scene, chosen, options);
+  character.clip = sample(rig, scene, chosen, options, path);
+  if (rig.skin.vertices.cols() == 0) add_capsules(rig, path);
   const Eigen::Affine3d upright = stand_upright(rig, character.clip.bone_pose.front());
   character.skeleton = std::move(rig.skeleton);
   for (Eigen::Affine3d& bind : character.skeleton.bind_pose) bind = upright * bind;
   character.skin = std::move(rig.skin);
   character.skin.vertices = upright * character.skin.vertices;
   make_bone_space_rigid(character.skeleton, character.clip);
+  require_finite(character, path);
   if (warnings) {
     warnings->insert(warnings->end(), scene.warnings.begin(), scene.warnings.end());
     warnings->insert(warnings->end(), rig.warnings.begin(), rig.warnings.end());

@@ -2,14 +2,24 @@
 
 #include <array>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
+#include "io/read_limits.h"
 #include "retarget/clip.h"
+#include "retarget/error.h"
 
 namespace hydrostat::io {
 
 struct ImportOptions {
-  double sample_rate_hz = 60;  // the clip gets max(2, round(rate * range)) equal intervals from first to last key
+  double sample_rate_hz = 60;            // the clip gets max(2, round(rate * range)) equal intervals from first to last key
+  std::vector<std::string> meshes = {};  // names or indices of those that come along; none: all of the skeleton
+  std::string root =
+      {};               // name of the node below which the skeleton hangs; empty: the only one, or the one of most vertices
+  std::string up = {};  // the file's axis that points up ("z", "-y" ...); empty: what the file tells, or a guess for BVH
+  double metres_per_unit = 0;  // of the file's numbers; 0: what the file tells, or a guess for BVH
+  ReadLimits limits = {};
 };
 
 /// Reads a character and one of its clips in metres, y up, seconds.
@@ -33,10 +43,18 @@ struct MeshInfo {
   bool skinned = false;
 };
 
-/// Box [m] of the skinned vertices (of the joints where there is no mesh), y up, at a fraction of the clip's duration.
+/// Box [m] of the skinned vertices (of the joints where there is no mesh), y up, at a fraction of the clip's duration (of
+/// BVH at the frame nearest to it).
 struct BoxInfo {
   double fraction = 0;
   Eigen::Vector3d min, max;
+};
+
+/// When a bone's skin is on the ground: within 1 % of L of the lowest point that the clip has, seen at 31 times.
+struct ContactInfo {
+  std::string bone;                                // that moves these vertices most
+  double duty = 0;                                 // share of range_s [-]
+  std::vector<std::pair<double, double>> times_s;  // from, until; 0 is the first key
 };
 
 struct ClipInfo {
@@ -47,7 +65,12 @@ struct ClipInfo {
   bool loop = false;  // the last key's pose is the first's, moved horizontally, to 2 % of L (RMS of the vertices)
   bool in_place =
       false;  // a loop that travels less than 5 % of L while its low points slide one way, by more than 10 % of L in all
-  double speed_m_s = 0;  // horizontal travel of the mean vertex over range_s
+  double speed_m_s = 0;              // horizontal travel of the mean vertex over range_s
+  double foot_speed_m_s = 0;         // at which the low points slide: of a clip in place, the speed that was taken from it
+  double closure_defect_length = 0;  // RMS distance of the last key's vertices from the first's, moved horizontally, of L
+  double max_strain =
+      0;  // of the skin's edges against the bind pose: the 99th percentile, the most over the clip; 0 without a mesh
+  std::vector<ContactInfo> contacts;
   std::vector<BoxInfo> bbox;
 };
 
@@ -59,12 +82,16 @@ struct FileInfo {
   std::vector<MeshInfo> meshes;
   std::vector<ClipInfo> clips;
   std::vector<std::string> warnings;
+  bool files_confined = false, network_confined = false;  // the reading process (io/confine.h)
 };
 
 /// Throws Error: no file, not readable, no skeleton, no clip. A skeleton without any mesh is told by its joints.
-FileInfo inspect(const std::string& path);
+FileInfo inspect(const std::string& path, const ImportOptions& options = {});
 
 /// Schema hydrostat.info/1.
 std::string to_json(const FileInfo& info);
+
+/// Schema hydrostat.info_table/1: of several files what is seen in each, or why it is refused.
+std::string to_json(const std::vector<std::variant<FileInfo, Error>>& files);
 
 }  // namespace hydrostat::io

@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -20,6 +21,7 @@
 #include <new>
 #include <system_error>
 
+#include "io/confine.h"
 #include "io/read_scene.h"
 #include "io/scene_wire.h"
 
@@ -29,44 +31,46 @@ namespace {
 constexpr const char* kWorkerArgument = "--import-worker";
 constexpr const char* kWorkerMark = "HYDROSTAT_IMPORT_WORKER";  // set in the worker's environment
 constexpr int kAnswerDescriptor = 3;
-constexpr rlim_t kMemoryLimit = rlim_t{3} << 30;                // [bytes]
-constexpr std::size_t kAnswerLimit = std::size_t{1} << 30;      // [bytes]
 constexpr std::uintmax_t kFileLimit = std::uintmax_t{1} << 30;  // [bytes]
 
+/// 'hydrostat-import' beside the running program, or else the running program itself.
+std::string default_worker() {
+  std::error_code failure;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", failure);
+  const std::filesystem::path small = self.parent_path() / "hydrostat-import";
+  return !failure && access(small.c_str(), X_OK) == 0 ? small.string() : "/proc/self/exe";
+}
+
 std::string& worker_executable() {
-  static std::string path = "/proc/self/exe";
+  static std::string path = default_worker();
   return path;
 }
 
-// A sanitizer reserves terabytes of address space, so the two exclude each other.
-constexpr bool kSanitized =
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-    true;
-#else
-    false;
-#endif
-#else
-    false;
-#endif
+double bytes_of(const ReadLimits& limits) { return limits.memory_gib * 0x1p30; }
 
-void limit_resources() {
-  const rlimit no_core{0, 0};
-  setrlimit(RLIMIT_CORE, &no_core);
-  if (kSanitized) return;
-  const rlimit memory{kMemoryLimit, kMemoryLimit};
-  setrlimit(RLIMIT_AS, &memory);
+std::string number_text(double number, const char* unit) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%g %s", number, unit);
+  return text.data();
 }
 
-WorkerAnswer read_or_say_why(const std::string& path) {
+Error too_large(const std::string& path, double memory_gib) {
+  return {path, "import", "reading it takes more than " + number_text(memory_gib, "GiB") + " of memory",
+          "Export the file anew, with less in it, or give a larger --import-memory"};
+}
+
+WorkerAnswer read_or_say_why(const std::string& path, const Confinement& confinement, double memory_gib) {
   try {
-    return read_scene(path);
+    Scene scene = read_scene(path);
+    scene.files_confined = confinement.files;
+    scene.network_confined = confinement.network;
+    return scene;
   } catch (const Error& error) {
-    return error;
+    // assimp catches what is thrown and keeps its text.
+    const bool memory = std::string_view(error.what()).find("bad_alloc") != std::string_view::npos;
+    return memory ? too_large(path, memory_gib) : error;
   } catch (const std::bad_alloc&) {
-    return Error(path, "import", "reading it takes more than 3 GiB of memory", "Export the file anew, with less in it");
+    return too_large(path, memory_gib);
   } catch (const std::exception& error) {
     return Error(path, "import", std::string("it cannot be read (") + error.what() + ")", "Export the file anew");
   }
@@ -94,9 +98,10 @@ struct Descriptor {
 };
 struct Child {
   pid_t pid = -1;
+  rusage used{};
   int wait_for_end() {
     int status = 0;
-    while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+    while (wait4(pid, &status, 0, &used) < 0 && errno == EINTR) {
     }
     pid = -1;
     return status;
@@ -123,7 +128,7 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return list;
 }
 
-pid_t start_worker(const std::string& path, int answer_descriptor) {
+pid_t start_worker(const std::string& path, const ReadLimits& limits, int answer_descriptor) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   // What the libraries print (failed asserts, above all) is not for the user.
@@ -131,7 +136,12 @@ pid_t start_worker(const std::string& path, int answer_descriptor) {
   posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
-  std::vector<std::string> arguments{"hydrostat", kWorkerArgument, path};
+  std::vector<std::string> arguments{"hydrostat-import",
+                                     kWorkerArgument,
+                                     path,
+                                     number_text(limits.memory_gib, ""),
+                                     number_text(std::ceil(limits.time_s) + 1, ""),
+                                     std::to_string(getpid())};
   std::vector<std::string> environment = marked_environment();
   pid_t pid = -1;
   const int failure = posix_spawn(&pid, worker_executable().c_str(), &actions, nullptr, pointers(arguments).data(),
@@ -144,33 +154,24 @@ pid_t start_worker(const std::string& path, int answer_descriptor) {
   return pid;
 }
 
-std::string seconds_text(std::chrono::milliseconds time) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%g s", static_cast<double>(time.count()) / 1000);
-  return text.data();
-}
-
-/// Reads until the other end closes. Throws Error after the time limit or past the size limit.
-std::string read_answer(int descriptor, const std::string& path, std::chrono::milliseconds time_limit) {
-  const auto deadline = std::chrono::steady_clock::now() + time_limit;
+/// Reads until the other end closes. Throws Error after the time limit, and past half of the memory limit: what is read is
+/// held twice.
+std::string read_answer(int descriptor, const std::string& path, const ReadLimits& limits) {
+  using Seconds = std::chrono::duration<double>;
+  const auto start = std::chrono::steady_clock::now();
   std::string bytes;
   std::array<char, 1 << 16> block;
   while (true) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    const double left_s = limits.time_s - Seconds(std::chrono::steady_clock::now() - start).count();
     pollfd waited{descriptor, POLLIN, 0};
-    const int ready = left.count() > 0 ? poll(&waited, 1, static_cast<int>(left.count())) : 0;
+    const int ready = left_s > 0 ? poll(&waited, 1, static_cast<int>(std::ceil(1000 * left_s))) : 0;
     if (ready < 0 && errno == EINTR) continue;
-    if (ready == 0) {
-      throw Error(path, "import", "reading it takes longer than " + seconds_text(time_limit),
-                  "Cut polygons of very many corners into triangles and export the file anew");
-    }
+    if (ready == 0) throw too_slow(path, limits.time_s);
     const ssize_t got = read(descriptor, block.data(), block.size());
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return bytes;
     bytes.append(block.data(), static_cast<std::size_t>(got));
-    if (bytes.size() > kAnswerLimit) {
-      throw Error(path, "import", "its meshes and keys fill more than 1 GiB", "Export the file anew, with less in it");
-    }
+    if (2 * static_cast<double>(bytes.size()) > bytes_of(limits)) throw too_large(path, limits.memory_gib);
   }
 }
 
@@ -190,15 +191,26 @@ void require_readable_file(const std::string& path) {
 
 }  // namespace
 
+Error too_slow(const std::string& path, double time_s) {
+  return {path, "import", "reading it takes longer than " + number_text(time_s, "s"),
+          "Cut polygons of very many corners into triangles and export the file anew, or give a longer --import-timeout"};
+}
+
 std::optional<int> run_import_worker(int argc, char** argv) {
-  if (argc != 3 || std::string_view(argv[1]) != kWorkerArgument) return std::nullopt;
-  limit_resources();
-  return write_all(kAnswerDescriptor, to_bytes(read_or_say_why(argv[2]))) ? 0 : 1;
+  if (argc != 6 || std::string_view(argv[1]) != kWorkerArgument) return std::nullopt;
+  const std::string path = argv[2];
+  const double memory_gib = std::strtod(argv[3], nullptr);
+  end_with_parent(std::atoi(argv[5]));
+  limit_resources(static_cast<unsigned long long>(memory_gib * 0x1p30),
+                  static_cast<unsigned>(std::strtod(argv[4], nullptr)));
+  const Confinement confinement = confine_to(path);
+  return write_all(kAnswerDescriptor, to_bytes(read_or_say_why(path, confinement, memory_gib))) ? 0 : 1;
 }
 
 void set_import_worker_executable(const std::string& path) { worker_executable() = path; }
 
-Scene read_in_worker(const std::string& path, std::chrono::milliseconds time_limit) {
+Scene read_in_worker(const std::string& path, const ReadLimits& limits, ReadCost* cost) {
+  const auto start = std::chrono::steady_clock::now();
   require_readable_file(path);
   // A program that forgot run_import_worker() would start itself without end.
   if (std::getenv(kWorkerMark) != nullptr) {
@@ -209,16 +221,25 @@ Scene read_in_worker(const std::string& path, std::chrono::milliseconds time_lim
     throw Error(path, "import", std::string("no pipe can be opened (") + std::strerror(errno) + ")", "Close other programs");
   }
   Descriptor reading{ends[0]}, writing{ends[1]};
-  Child worker{start_worker(path, writing.value)};
+  Child worker{start_worker(path, limits, writing.value)};
   writing.close_now();
-  const std::string bytes = read_answer(reading.value, path, time_limit);
+  const std::string bytes = read_answer(reading.value, path, limits);
   const int status = worker.wait_for_end();
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) throw too_slow(path, limits.time_s);
   if (WIFSIGNALED(status)) {
     throw Error(path, "import", std::string("the file brings its reader down (") + strsignal(WTERMSIG(status)) + ")",
                 "Export the file anew, or in the other format of FBX and glTF");
   }
   try {
     WorkerAnswer answer = from_bytes(bytes);
+    if (cost) {
+      const auto seconds = [](const timeval& time) {
+        return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+      };
+      cost->wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      cost->cpu_s = seconds(worker.used.ru_utime) + seconds(worker.used.ru_stime);
+      cost->peak_mib = static_cast<double>(worker.used.ru_maxrss) / 1024;
+    }
     if (const Error* error = std::get_if<Error>(&answer)) throw Error(*error);
     return std::get<Scene>(std::move(answer));
   } catch (const Error&) {

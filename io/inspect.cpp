@@ -1,84 +1,22 @@
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "io/clip_range.h"
+#include "io/describe_clip.h"
 #include "io/import.h"
 #include "io/import_worker.h"
+#include "io/read_chosen_parts.h"
 #include "io/rig.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
 namespace {
 
-constexpr std::array<double, 5> kFractions{0, 0.15, 0.4, 0.7, 1};
-constexpr double kLoopDefect = 0.02, kInPlaceTravel = 0.05, kSlide = 0.1, kLow = 0.03;  // relative to L
-constexpr int kSlideFrames = 30;
 constexpr double kSmallest = 0.01, kLargest = 30;  // [m]; what a creature's length lies between
-
-/// The skinned vertices [m], or the joints where there is no mesh, at a time of the clip.
-Eigen::Matrix3Xd points_at(const Rig& rig, const Scene& scene, const SceneClip& clip, double time_s) {
-  const std::vector<Eigen::Affine3d> pose = bone_poses(rig, scene, clip, time_s);
-  if (rig.skin.vertices.cols() > 0) return skin_positions(rig.skeleton, rig.skin, pose);
-  Eigen::Matrix3Xd joints(3, static_cast<Eigen::Index>(pose.size()));
-  for (std::size_t b = 0; b < pose.size(); ++b) joints.col(static_cast<Eigen::Index>(b)) = pose[b].translation();
-  return joints;
-}
-
-Eigen::Vector3d horizontal(const Eigen::Vector3d& vector) { return {vector.x(), 0, vector.z()}; }
-
-/// How far the low points slide in all [m]: the mean horizontal step of the points within 3 % of L of the lowest, summed.
-double slide_of_low_points(const std::vector<Eigen::Matrix3Xd>& frames, double length) {
-  double floor = frames.front().row(1).minCoeff();
-  for (const Eigen::Matrix3Xd& frame : frames) floor = std::min(floor, frame.row(1).minCoeff());
-  Eigen::Vector3d slide = Eigen::Vector3d::Zero();
-  for (std::size_t f = 1; f < frames.size(); ++f) {
-    Eigen::Vector3d step = Eigen::Vector3d::Zero();
-    int low = 0;
-    for (Eigen::Index p = 0; p < frames[f].cols(); ++p) {
-      if (std::max(frames[f](1, p), frames[f - 1](1, p)) > floor + kLow * length) continue;
-      step += frames[f].col(p) - frames[f - 1].col(p);
-      ++low;
-    }
-    if (low > 0) slide += horizontal(step) / low;
-  }
-  return slide.norm();
-}
-
-void describe_travel(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range, ClipInfo& info) {
-  std::vector<Eigen::Matrix3Xd> frames;
-  for (int f = 0; f <= kSlideFrames; ++f) {
-    frames.push_back(points_at(rig, scene, clip, range.start_s + range.length_s() * f / kSlideFrames));
-  }
-  const Eigen::Matrix3Xd& first = frames.front();
-  const double length = (first.rowwise().maxCoeff() - first.rowwise().minCoeff()).maxCoeff();
-  const Eigen::Matrix3Xd shift = frames.back() - first;
-  const Eigen::Vector3d travel = horizontal(shift.rowwise().mean());
-  const double defect = std::sqrt((shift.colwise() - travel).colwise().squaredNorm().mean());
-  info.loop = defect <= kLoopDefect * length;
-  info.in_place =
-      info.loop && travel.norm() < kInPlaceTravel * length && slide_of_low_points(frames, length) > kSlide * length;
-  info.speed_m_s = travel.norm() / range.length_s();
-}
-
-ClipInfo describe_clip(const Rig& rig, const Scene& scene, std::size_t index) {
-  const SceneClip& clip = scene.clips[index];
-  const ClipRange range = range_of(clip);
-  ClipInfo info;
-  info.index = static_cast<int>(index);
-  info.name = clip.name;
-  info.duration_s = clip.duration_s > 0 ? clip.duration_s : range.end_s;
-  info.range_s = range.length_s();
-  info.rate_hz = range.key_rate_hz;
-  if (info.range_s >= kShortestClip) describe_travel(rig, scene, clip, range, info);
-  for (const double fraction : kFractions) {
-    const Eigen::Matrix3Xd points = points_at(rig, scene, clip, fraction * info.duration_s);
-    info.bbox.push_back({fraction, points.rowwise().minCoeff(), points.rowwise().maxCoeff()});
-  }
-  return info;
-}
 
 nlohmann::ordered_json to_list(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
 
@@ -91,10 +29,32 @@ void warn_of_size(const ClipInfo& clip, std::vector<std::string>& warnings) {
                      " m long, which is no creature's size; give its height.");
 }
 
+bool is_finite(const ClipInfo& clip) {
+  bool finite = std::isfinite(clip.speed_m_s + clip.foot_speed_m_s + clip.closure_defect_length + clip.max_strain);
+  for (const BoxInfo& box : clip.bbox) finite = finite && box.min.allFinite() && box.max.allFinite();
+  return finite;
+}
+
+/// Refuses a file when its time is up.
+class Deadline {
+ public:
+  Deadline(const std::string& path, const ReadLimits& limits) : path_(path), limits_(limits) {}
+  void check() const {
+    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count() > limits_.time_s)
+      throw too_slow(path_, limits_.time_s);
+  }
+
+ private:
+  const std::string& path_;
+  const ReadLimits limits_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
 }  // namespace
 
-FileInfo inspect(const std::string& path) {
-  const Scene scene = read_in_worker(path);
+FileInfo inspect(const std::string& path, const ImportOptions& options) {
+  const Deadline deadline(path, options.limits);
+  const Scene scene = read_chosen_parts(path, options);
   const Rig rig = build_rig(scene, path);
   const std::size_t first_moving = choose_clip(scene, "", path);
   FileInfo info;
@@ -111,15 +71,26 @@ FileInfo inspect(const std::string& path) {
     info.meshes.push_back(
         {mesh.name, static_cast<int>(mesh.vertices.cols()), static_cast<int>(mesh.triangles.cols()), !mesh.joints.empty()});
   }
-  for (std::size_t c = 0; c < scene.clips.size(); ++c) info.clips.push_back(describe_clip(rig, scene, c));
+  for (std::size_t c = 0; c < scene.clips.size(); ++c) {
+    deadline.check();
+    info.clips.push_back(describe_clip(rig, scene, c));
+    if (!is_finite(info.clips.back()))
+      throw Error(path, "clip '" + info.clips.back().name + "'", "its transforms overflow",
+                  "Export it anew in a sane scale");
+  }
+  info.files_confined = scene.files_confined;
+  info.network_confined = scene.network_confined;
   info.warnings = scene.warnings;
   info.warnings.insert(info.warnings.end(), rig.warnings.begin(), rig.warnings.end());
   warn_of_size(info.clips[first_moving], info.warnings);
   return info;
 }
 
-std::string to_json(const FileInfo& info) {
-  using Json = nlohmann::ordered_json;
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const FileInfo& info) {
   Json json{{"schema", "hydrostat.info/1"},
             {"file", info.file},
             {"format", info.format},
@@ -141,6 +112,12 @@ std::string to_json(const FileInfo& info) {
     Json boxes = Json::array();
     for (const BoxInfo& box : clip.bbox)
       boxes.push_back({{"fraction", box.fraction}, {"min", to_list(box.min)}, {"max", to_list(box.max)}});
+    Json contacts = Json::array();
+    for (const ContactInfo& contact : clip.contacts) {
+      Json times = Json::array();
+      for (const auto& [from_s, until_s] : contact.times_s) times.push_back({from_s, until_s});
+      contacts.push_back({{"bone", contact.bone}, {"duty", contact.duty}, {"times_s", times}});
+    }
     json["clips"].push_back({{"index", clip.index},
                              {"name", clip.name},
                              {"duration_s", clip.duration_s},
@@ -149,10 +126,35 @@ std::string to_json(const FileInfo& info) {
                              {"loop", clip.loop},
                              {"in_place", clip.in_place},
                              {"speed_m_s", clip.speed_m_s},
+                             {"foot_speed_m_s", clip.foot_speed_m_s},
+                             {"closure_defect_length", clip.closure_defect_length},
+                             {"max_strain", clip.max_strain},
+                             {"contacts", contacts},
                              {"bbox", boxes}});
   }
   json["warnings"] = info.warnings;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);  // foreign names need not be UTF-8
+  json["confined"] = {{"files", info.files_confined}, {"network", info.network_confined}};
+  return json;
+}
+
+// Foreign names need not be UTF-8.
+std::string text_of(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+
+}  // namespace
+
+std::string to_json(const FileInfo& info) { return text_of(json_of(info)); }
+
+std::string to_json(const std::vector<std::variant<FileInfo, Error>>& files) {
+  Json json{{"schema", "hydrostat.info_table/1"}, {"files", Json::array()}};
+  for (const auto& entry : files) {
+    if (const auto* info = std::get_if<FileInfo>(&entry)) {
+      json["files"].push_back(json_of(*info));
+    } else {
+      const Error& error = std::get<Error>(entry);
+      json["files"].push_back({{"file", error.file}, {"where", error.where}, {"error", error.what()}, {"mend", error.mend}});
+    }
+  }
+  return text_of(json);
 }
 
 }  // namespace hydrostat::io

@@ -2,6 +2,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
@@ -11,6 +12,7 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "io/lost_curves.h"
 #include "io/read_scene.h"
 #include "io/track.h"
 #include "retarget/error.h"
@@ -20,6 +22,7 @@ namespace {
 
 constexpr std::string_view kPivotMark = "_$AssimpFbx$_";
 constexpr double kDefaultTicksPerSecond = 25;
+constexpr double kLongestFrame = 1.0 / 24;  // [s]; a tick is a second where assimp does not know the rate
 
 Eigen::Affine3d to_eigen(const aiMatrix4x4& matrix) {
   Eigen::Affine3d ours = Eigen::Affine3d::Identity();
@@ -105,8 +108,6 @@ class AssimpReader {
   }
 
   void read_unit_and_axes() {
-    if (scene_.format == "bvh")
-      scene_.warnings.push_back("A BVH file tells no unit and no axes: metres and y up are assumed.");
     if (scene_.format != "fbx") return;  // Collada's unit and axis are on its root node
     const double unit_cm = setting("UnitScaleFactor", static_cast<double>(setting("UnitScaleFactor", 1.0f)));
     if (!(unit_cm > 0) || !std::isfinite(unit_cm))
@@ -237,8 +238,17 @@ class AssimpReader {
           read_channel(source, *place, ticks, "clip '" + clip.name + "', node '" + name + "'");
       if (pivot_of(name).empty()) whole.push_back(place->node);
     }
+    for (unsigned m = 0; m < theirs.mNumMorphMeshChannels; ++m) {
+      scene_.warnings.push_back("Clip '" + clip.name + "' moves the morph targets of '" +
+                                theirs.mMorphMeshChannels[m]->mName.C_Str() +
+                                "', which hold still as at rest; give that motion to bones before export.");
+    }
     for (const int node : whole) still_pivots(node, channels);
     for (auto& [place, channel] : channels) clip.channels.push_back(std::move(channel));
+    if (scene_.format == "fbx") {
+      for (std::string& warning : lost_curve_warnings(scene_, clip, std::min(1 / std::abs(ticks), kLongestFrame)))
+        scene_.warnings.push_back(std::move(warning));
+    }
     scene_.clips.push_back(std::move(clip));
   }
 

@@ -1,6 +1,7 @@
 #include <tiny_gltf.h>
 
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -19,6 +20,11 @@ constexpr const char* kExportAnew = "Export the file anew";
 
 bool ignore_image(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
   return true;
+}
+
+std::string upper_first(std::string text) {
+  if (!text.empty()) text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  return text;
 }
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
@@ -197,11 +203,24 @@ class GltfReader {
     const auto positions = primitive.attributes.find("POSITION");
     if (positions == primitive.attributes.end()) return;
     ours.vertices = numbers(positions->second, 3, where);
+    add_morph_targets(primitive, node.weights.empty() ? mesh.weights : node.weights, where, ours.vertices);
     if (!ours.vertices.allFinite()) refuse(where, "a vertex is not finite");
     ours.triangles = triangles(primitive, ours.vertices.cols(), where);
     if (ours.triangles.cols() == 0) return;  // points or lines
     if (node.skin >= 0) ours.joints = joints(primitive, at(model_.skins, node.skin, where), ours.vertices.cols(), where);
     scene_.meshes.push_back(std::move(ours));
+  }
+
+  /// Moves the vertices by the morph targets as the mesh wears them at rest.
+  void add_morph_targets(const tinygltf::Primitive& primitive, const std::vector<double>& weights, const std::string& where,
+                         Eigen::Matrix3Xd& vertices) const {
+    for (std::size_t t = 0; t < primitive.targets.size() && t < weights.size(); ++t) {
+      const auto positions = primitive.targets[t].find("POSITION");
+      if (positions == primitive.targets[t].end() || weights[t] == 0) continue;
+      const Eigen::MatrixXd offsets = numbers(positions->second, 3, where);
+      if (offsets.cols() != vertices.cols()) refuse(where, "a morph target has not as many vertices as the mesh");
+      vertices += weights[t] * offsets;
+    }
   }
 
   Eigen::Matrix3Xi triangles(const tinygltf::Primitive& primitive, Eigen::Index vertices, const std::string& where) const {
@@ -286,7 +305,8 @@ class GltfReader {
       if (channel.target_node < 0) continue;
       const std::size_t node = place(channel.target_node, where);
       const bool turns = channel.target_path == "rotation";
-      if (!turns && channel.target_path != "translation" && channel.target_path != "scale") continue;  // morph weights
+      if (channel.target_path == "weights") warn_of_morphs(where, scene_.nodes[node].name);
+      if (!turns && channel.target_path != "translation" && channel.target_path != "scale") continue;
       Track& track = turns                            ? by_node[node].rotation
                      : channel.target_path == "scale" ? by_node[node].scale
                                                       : by_node[node].translation;
@@ -301,6 +321,11 @@ class GltfReader {
       clip.channels.push_back(std::move(by_node[n]));
     }
     scene_.clips.push_back(std::move(clip));
+  }
+
+  void warn_of_morphs(const std::string& clip, const std::string& node) {
+    scene_.warnings.push_back(upper_first(clip) + " moves the morph targets of '" + node +
+                              "', which hold still as at rest; give that motion to bones before export.");
   }
 
   Track read_track(const tinygltf::AnimationSampler& sampler, Eigen::Index rows, const std::string& where) const {

@@ -8,10 +8,24 @@
 
 namespace hydrostat::io {
 
-Scene read_scene(const std::string& path) {
+namespace {
+
+std::string extension_of(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return extension;
+}
+
+}  // namespace
+
+bool is_clip_file(const std::string& path) {
+  const std::string extension = extension_of(path);
+  return extension == ".fbx" || extension == ".glb" || extension == ".gltf" || extension == ".dae" || extension == ".bvh";
+}
+
+Scene read_scene(const std::string& path) {
+  const std::string extension = extension_of(path);
   if (extension == ".gltf" || extension == ".glb") return read_gltf(path);
   if (extension == ".fbx" || extension == ".dae" || extension == ".bvh" || extension == ".obj" ||
       extension == ".stl") {

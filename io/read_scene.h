@@ -11,6 +11,9 @@ namespace hydrostat::io {
 /// A hostile file can end the process or hang it; read_in_worker() is the safe way. Throws Error.
 Scene read_scene(const std::string& path);
 
+/// Whether a file's name ends in what clip files end in: .fbx, .glb, .gltf, .dae or .bvh, in any case.
+bool is_clip_file(const std::string& path);
+
 /// assimp 5.2.5, with its known faults made good: see the file for each.
 Scene read_with_assimp(const std::string& path);
 

@@ -1,32 +1,24 @@
 #include "io/rig.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <set>
 #include <utility>
 
+#include "io/rig_skin.h"
 #include "io/scene_pose.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
 namespace {
 
-constexpr double kSameBind = 1e-4;    // distance at which two bind poses are one, relative to the mesh's extent
-constexpr double kWeldGrid = 1e-6;    // relative to the skin's extent
-constexpr double kWeightGrid = 1e-3;  // difference of skin weights that keeps vertices apart
-constexpr double kNoWeight = 1e-6;    // sum of skin weights below which a vertex has none
+constexpr double kSameBind = 1e-4;  // distance at which two bind poses are one, relative to the mesh's extent
 
 bool is_singular(const Eigen::Affine3d& transform) {
   const double size = transform.linear().norm();
   return !(std::abs(transform.linear().determinant()) > 1e-12 * size * size * size);
-}
-
-double extent_of(const Eigen::Matrix3Xd& points) {
-  return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).maxCoeff();
 }
 
 /// Largest distance between what two transforms make of the corners of a mesh's box.
@@ -72,18 +64,15 @@ class RigBuilder {
     for (const SceneMesh& mesh : scene_.meshes) {
       if (is_skinned(mesh)) skinned_.push_back(&mesh);
     }
-    if (skinned_.empty()) {
-      require_skeleton_alone();
-    } else {
-      bind_meshes();
-    }
+    if (!skinned_.empty() || moves_as_parts()) bind_meshes();
+    if (skinned_.empty()) require_skeleton_alone();
     add_bones();
-    for (std::size_t m = 0; m < skinned_.size(); ++m) add_mesh(m);
-    if (!skinned_.empty()) {
-      bind_stray_vertices();
-      weld();
-      face_outward();
+    for (std::size_t m = 0; m < skinned_.size(); ++m) {
+      std::vector<int> bones;
+      for (const Bound& bound : bound_[m]) bones.push_back(bound.bone);
+      add_mesh(*skinned_[m], into_bind_[m], bones, rig_);
     }
+    if (!skinned_.empty()) finish_skin(rig_);
     return std::move(rig_);
   }
 
@@ -103,6 +92,24 @@ class RigBuilder {
                 "Bind the mesh to bones and export it with its skin and its clip");
   }
 
+  /// Whether some clip moves several nodes with meshes at once, as the parts of a jointed toy; a thing that flies about for
+  /// itself is no character.
+  bool moves_as_parts() const {
+    std::vector<bool> carries(scene_.nodes.size(), false);
+    for (const SceneMesh& mesh : scene_.meshes) {
+      int carrier = mesh.node;
+      while (!moved_[static_cast<std::size_t>(carrier)] && node(carrier).parent >= 0) carrier = node(carrier).parent;
+      carries[static_cast<std::size_t>(carrier)] = true;
+    }
+    return std::any_of(scene_.clips.begin(), scene_.clips.end(), [&](const SceneClip& clip) {
+      std::set<int> parts;
+      for (const Channel& channel : clip.channels) {
+        if (carries[static_cast<std::size_t>(channel.node)]) parts.insert(channel.node);
+      }
+      return parts.size() >= 2;
+    });
+  }
+
   /// Finds one bind pose for the bones of all meshes, and what takes each mesh into it. The skinned mesh of most vertices
   /// leads.
   void bind_meshes() {
@@ -120,7 +127,10 @@ class RigBuilder {
     find_rigid_parts();
     for (const SceneMesh& part : rigid_parts_) {
       skinned_.push_back(&part);
-      bind_mesh(part);
+      into_bind_.push_back(part.joints.empty()
+                               ? stand_in_bind_space(part.node)
+                               : stand_in_bind_space(part.joints.front().node) * part.joints.front().inverse_bind_matrix);
+      bound_.push_back(bind_joints(part, into_bind_.back()));
     }
   }
 
@@ -132,15 +142,22 @@ class RigBuilder {
   /// Meshes without a skin that hang below a bone (a robot's plates) belong to the body: each goes whole with the nearest
   /// node above it that moves by itself. Other meshes (a static double, the floor) stay out.
   void find_rigid_parts() {
-    int left_out = 0;
+    std::string left_out;
+    int count = 0;
     for (const SceneMesh& mesh : scene_.meshes) {
       if (is_skinned(mesh)) continue;
       int carrier = mesh.node;
       while (!moved_[static_cast<std::size_t>(carrier)] && !node(carrier).is_joint && node(carrier).parent >= 0)
         carrier = node(carrier).parent;
-      if (!hangs_below_joint(mesh.node) || is_singular(rest_[static_cast<std::size_t>(carrier)]) ||
-          is_singular(rest_[static_cast<std::size_t>(mesh.node)])) {
-        ++left_out;
+      const bool carried = hangs_below_joint(mesh.node) || moved_[static_cast<std::size_t>(carrier)];
+      const bool flat =
+          is_singular(rest_[static_cast<std::size_t>(carrier)]) || is_singular(rest_[static_cast<std::size_t>(mesh.node)]);
+      if (mesh.is_wanted && !carried && !skinned_.empty()) {
+        rigid_parts_.push_back(mesh);  // its vertices go with the nearest bones
+        continue;
+      }
+      if (!carried || flat) {
+        left_out += (count++ == 0 ? "'" : ", '") + mesh.name + "'";
         continue;
       }
       SceneMesh part = mesh;
@@ -152,9 +169,10 @@ class RigBuilder {
       part.joints = {joint};
       rigid_parts_.push_back(std::move(part));
     }
-    if (left_out == 0) return;
-    rig_.warnings.push_back(std::to_string(left_out) + " of " + std::to_string(scene_.meshes.size()) +
-                            " meshes are not bound to bones and are left out.");
+    if (count == 0) return;
+    rig_.warnings.push_back(std::to_string(count) + " of " + std::to_string(scene_.meshes.size()) +
+                            " meshes are not bound to bones, nor hang on any that moves, and are left out: " + left_out +
+                            ". Bind them, or name them with --mesh.");
   }
 
   bool hangs_below_joint(int n) const {
@@ -179,6 +197,18 @@ class RigBuilder {
     }
     const std::optional<Eigen::Affine3d> beside = bind_beside(joints.front()->node);
     return beside ? *beside * joints.front()->inverse_bind_matrix : Eigen::Affine3d::Identity();
+  }
+
+  /// Where a node that is no bone of any skin stands in the bind pose: to its nearest bound relative, or else to the
+  /// first bone of weight, as at rest.
+  Eigen::Affine3d stand_in_bind_space(int node) const {
+    if (bind_[static_cast<std::size_t>(node)]) return *bind_[static_cast<std::size_t>(node)];
+    if (const std::optional<Eigen::Affine3d> beside = bind_beside(node)) return *beside;
+    for (std::size_t n = 0; n < bind_.size(); ++n) {
+      if (bind_[n] && weighted_[n] && !is_singular(rest_[n]))
+        return *bind_[n] * rest_[n].inverse() * rest_[static_cast<std::size_t>(node)];
+    }
+    return rest_[static_cast<std::size_t>(node)];
   }
 
   std::vector<Bound> bind_joints(const SceneMesh& mesh, const Eigen::Affine3d& into_bind) {
@@ -290,138 +320,6 @@ class RigBuilder {
     rig_.skeleton.weighted.push_back(weighted);
     rig_.scene_nodes.push_back(node);
     return rig_.skeleton.count() - 1;
-  }
-
-  /// Appends a mesh's vertices in the common bind pose, its triangles and its weights, made to sum to 1.
-  void add_mesh(std::size_t m) {
-    const SceneMesh& mesh = *skinned_[m];
-    retarget::SkinnedMesh& skin = rig_.skin;
-    const Eigen::Index first = skin.vertices.cols(), first_triangle = skin.triangles.cols();
-    skin.vertices.conservativeResize(Eigen::NoChange, first + mesh.vertices.cols());
-    skin.vertices.rightCols(mesh.vertices.cols()) = rig_.to_ours * into_bind_[m] * mesh.vertices;
-    skin.triangles.conservativeResize(Eigen::NoChange, first_triangle + mesh.triangles.cols());
-    skin.triangles.rightCols(mesh.triangles.cols()) = mesh.triangles.array() + static_cast<int>(first);
-    if (into_bind_[m].linear().determinant() < 0) {
-      skin.triangles.rightCols(mesh.triangles.cols()).row(1).swap(skin.triangles.rightCols(mesh.triangles.cols()).row(2));
-    }
-    std::vector<std::map<int, double>> sums(static_cast<std::size_t>(mesh.vertices.cols()));
-    for (std::size_t j = 0; j < mesh.joints.size(); ++j) {
-      for (const SceneMesh::Weight& weight : mesh.joints[j].weights) {
-        sums[static_cast<std::size_t>(weight.vertex)][bound_[m][j].bone] += weight.weight;
-      }
-    }
-    for (const std::map<int, double>& weights : sums) {
-      double total = 0;
-      for (const auto& [bone, weight] : weights) total += weight;
-      std::vector<retarget::SkinnedMesh::Influence> influences;
-      for (const auto& [bone, weight] : weights) {
-        if (total > kNoWeight && weight > 0) influences.push_back({bone, weight / total});
-      }
-      skin.skin_weights.push_back(std::move(influences));
-    }
-  }
-
-  /// Binds every vertex without weights to the weighted bone whose origin, or line to a child, is nearest.
-  void bind_stray_vertices() {
-    int strays = 0;
-    for (Eigen::Index v = 0; v < rig_.skin.vertices.cols(); ++v) {
-      std::vector<retarget::SkinnedMesh::Influence>& influences = rig_.skin.skin_weights[static_cast<std::size_t>(v)];
-      if (!influences.empty()) continue;
-      influences.push_back({nearest_bone(rig_.skin.vertices.col(v)), 1});
-      ++strays;
-    }
-    if (strays > 0)
-      rig_.warnings.push_back(std::to_string(strays) + " vertices have no skin weights; each goes with the nearest bone.");
-  }
-
-  int nearest_bone(const Eigen::Vector3d& point) const {
-    const retarget::Skeleton& skeleton = rig_.skeleton;
-    double least = std::numeric_limits<double>::infinity();
-    int nearest = -1;
-    const auto consider = [&](int bone, double distance) {
-      if (distance >= least || !skeleton.weighted[static_cast<std::size_t>(bone)]) return;
-      least = distance;
-      nearest = bone;
-    };
-    for (int b = 0; b < skeleton.count(); ++b) {
-      const Eigen::Vector3d end = skeleton.bind_pose[static_cast<std::size_t>(b)].translation();
-      consider(b, (point - end).norm());
-      const int parent = skeleton.parents[static_cast<std::size_t>(b)];
-      if (parent < 0) continue;
-      const Eigen::Vector3d start = skeleton.bind_pose[static_cast<std::size_t>(parent)].translation();
-      const double along = (point - start).dot(end - start) / std::max((end - start).squaredNorm(), 1e-300);
-      consider(parent, (point - start - std::clamp(along, 0.0, 1.0) * (end - start)).norm());
-    }
-    return nearest;
-  }
-
-  /// Makes one vertex of those that share place and weights (seams of texture and normals), and drops triangles that
-  /// collapse.
-  void weld() {
-    retarget::SkinnedMesh& skin = rig_.skin;
-    const double grid = kWeldGrid * std::max(extent_of(skin.vertices), 1e-12);
-    using Place = std::array<long long, 3>;
-    std::map<Place, std::vector<int>> welded_at;
-    std::vector<int> now(static_cast<std::size_t>(skin.vertices.cols()));
-    retarget::SkinnedMesh welded;
-    welded.vertices.resize(3, skin.vertices.cols());
-    for (Eigen::Index v = 0; v < skin.vertices.cols(); ++v) {
-      const auto& weights = skin.skin_weights[static_cast<std::size_t>(v)];
-      Place place;
-      for (int axis = 0; axis < 3; ++axis)
-        place[static_cast<std::size_t>(axis)] = std::llround(skin.vertices(axis, v) / grid);
-      std::vector<int>& here = welded_at[place];
-      const auto same = std::find_if(here.begin(), here.end(), [&](int other) {
-        return weights_agree(weights, welded.skin_weights[static_cast<std::size_t>(other)]);
-      });
-      if (same == here.end()) {
-        here.push_back(static_cast<int>(welded.skin_weights.size()));
-        welded.vertices.col(here.back()) = skin.vertices.col(v);
-        welded.skin_weights.push_back(weights);
-        now[static_cast<std::size_t>(v)] = here.back();
-      } else {
-        now[static_cast<std::size_t>(v)] = *same;
-      }
-    }
-    welded.vertices.conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(welded.skin_weights.size()));
-    welded.triangles.resize(3, skin.triangles.cols());
-    Eigen::Index kept = 0;
-    for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
-      const Eigen::Vector3i corners =
-          skin.triangles.col(t).unaryExpr([&](int v) { return now[static_cast<std::size_t>(v)]; });
-      const bool flat = corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
-      if (!flat) welded.triangles.col(kept++) = corners;
-    }
-    welded.triangles.conservativeResize(Eigen::NoChange, kept);
-    skin = std::move(welded);
-  }
-
-  /// Turns the triangles of a closed skin round where they face inward.
-  void face_outward() {
-    retarget::SkinnedMesh& skin = rig_.skin;
-    std::set<std::pair<int, int>> edges;
-    double volume = 0;
-    for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
-      const Eigen::Vector3i corners = skin.triangles.col(t);
-      for (int c = 0; c < 3; ++c) edges.emplace(corners[c], corners[(c + 1) % 3]);
-      const Eigen::Vector3d a = skin.vertices.col(corners[0]), b = skin.vertices.col(corners[1]),
-                            c = skin.vertices.col(corners[2]);
-      volume += a.dot(b.cross(c)) / 6;
-    }
-    const bool closed = std::all_of(edges.begin(), edges.end(), [&](const std::pair<int, int>& edge) {
-      return edges.contains({edge.second, edge.first});
-    });
-    if (!closed || volume >= 0) return;
-    skin.triangles.row(1).swap(skin.triangles.row(2));
-    rig_.warnings.push_back("The skin's triangles face inward; they are turned round.");
-  }
-
-  /// Both lists are sorted by bone.
-  static bool weights_agree(const std::vector<retarget::SkinnedMesh::Influence>& a,
-                            const std::vector<retarget::SkinnedMesh::Influence>& b) {
-    return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
-             return x.bone == y.bone && std::abs(x.weight - y.weight) < kWeightGrid;
-           });
   }
 
   const Scene& scene_;

@@ -62,6 +62,7 @@ struct SceneMesh {
   Eigen::Matrix3Xd vertices;   // [file units] 3 x V, mesh space
   Eigen::Matrix3Xi triangles;  // 3 x T
   std::vector<Joint> joints;   // none: not skinned
+  bool is_wanted = false;      // named by the user: comes along even where nothing carries it
 };
 
 /// What a clip file holds, in its own units and axes, as the worker process hands it over.
@@ -74,6 +75,7 @@ struct Scene {
   std::vector<SceneMesh> meshes;                          // of triangles
   std::vector<SceneClip> clips;
   std::vector<std::string> warnings;
+  bool files_confined = false, network_confined = false;  // the worker process while it read (io/confine.h)
 };
 
 }  // namespace hydrostat::io

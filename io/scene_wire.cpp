@@ -9,8 +9,10 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x314e4353'4f524459;  // begins an answer
+constexpr std::uint64_t kMagic = 0x324e4353'4f524459;  // begins an answer; another for each form of it
 constexpr std::uint64_t kEnd = 0x2e646e65'2e646e65;    // ends it
+constexpr double kLargestNumber = 1e12;
+constexpr std::size_t kMostNodes = 10000, kMostClips = 2000;  // what follows takes time that grows faster than they do
 
 class Writer {
  public:
@@ -39,7 +41,9 @@ class Reader {
     std::memcpy(&value, left_.data(), sizeof(Number));
     left_.remove_prefix(sizeof(Number));
     if constexpr (std::is_floating_point_v<Number>) {
-      if (!std::isfinite(value)) throw std::runtime_error("it holds a number that is not finite");
+      // Below any size, time or weight that means something; a deep chain of such factors would overflow.
+      if (!(std::abs(value) <= kLargestNumber))
+        throw std::runtime_error("it holds a number that is not finite, or above 1e12");
     }
   }
   std::size_t count(std::size_t /*actual*/, std::size_t bytes_each) {
@@ -165,6 +169,8 @@ void pass(Wire& wire, Scene& scene) {
   pass(wire, scene.meshes);
   pass(wire, scene.clips);
   pass(wire, scene.warnings);
+  pass(wire, scene.files_confined);
+  pass(wire, scene.network_confined);
 }
 
 void require(bool fits, const char* what) {
@@ -188,6 +194,8 @@ void check_track(const Track& track, Eigen::Index rows) {
 /// Throws std::runtime_error where an index points nowhere or sizes disagree.
 void check(const Scene& scene) {
   require(scene.metres_per_unit > 0, "the unit is not positive");
+  require(scene.nodes.size() <= kMostNodes, "it has more than 10,000 nodes");
+  require(scene.clips.size() <= kMostClips, "it has more than 2,000 clips");
   for (std::size_t n = 0; n < scene.nodes.size(); ++n) {
     const SceneNode& node = scene.nodes[n];
     require(node.parent >= -1 && node.parent < static_cast<int>(n), "a node comes before its parent");

@@ -65,6 +65,13 @@ Eigen::MatrixXd settled_directions(const Eigen::MatrixXd& direction, const std::
 
 }  // namespace
 
+bool is_dragged(const ContactSchedule& contacts) {
+  const auto slides = [](const std::vector<ContactState>& states) {
+    return std::find(states.begin(), states.end(), ContactState::kSlide) != states.end();
+  };
+  return std::any_of(contacts.state.begin(), contacts.state.end(), slides);
+}
+
 double ContactSchedule::flight_s(double rate_hz) const {
   Eigen::Index flying = 0;
   for (Eigen::Index f = 0; f < touching.cols(); ++f) flying += touching.col(f).any() ? 0 : 1;

@@ -28,6 +28,9 @@ struct ContactSchedule {
   double flight_s(double rate_hz) const;  // frames without any contact
 };
 
+/// Whether the plan lets a patch slide that bears load.
+bool is_dragged(const ContactSchedule& contacts);
+
 struct ContactOptions {
   double height = 0.03;        // per D: a patch touches below this
   double hysteresis = 1.5;     // on height, while it touches

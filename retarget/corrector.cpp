@@ -111,8 +111,9 @@ void Corrector::weigh_nodes() {
   }
 }
 
-/// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration.
-void Corrector::weigh_momentum(const physics::State& state, double grip) {
+/// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration. Returns how far all six are off,
+/// in speeds per sqrt(g L).
+double Corrector::weigh_momentum(const physics::State& state, double grip) {
   const physics::Body& body = scene_.body;
   const int nodes = body.node_count();
   const double mass = body.mass.sum();
@@ -130,6 +131,7 @@ void Corrector::weigh_momentum(const physics::State& state, double grip) {
   }
   for (const int row : {0, 2, 4}) rows.row(row) *= grip;
   weighted_.middleRows<6>(3 * nodes).noalias() = (options_.root_weight / speed_unit_) * rows * response_;
+  return weighted_.middleRows<6>(3 * nodes).rightCols<1>().norm() / options_.root_weight;
 }
 
 /// The mean of each foot in the air, on its way to where it can catch the body.
@@ -184,12 +186,13 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
             (contact_stiffness_ * options_.horizon_s / weight) * response_.leftCols(muscles), previous_, cones_);
   response_.col(muscles) += (state.x - reference.x).reshaped() / options_.settle_s;
   weigh_nodes();
-  weigh_momentum(state, contact.grip);
+  const double error = weigh_momentum(state, contact.grip);
 
   normal_.setZero(muscles + 1, muscles + 1);
   normal_.selfadjointView<Eigen::Lower>().rankUpdate(weighted_.transpose());
   Eigen::MatrixXd left = normal_.topLeftCorner(muscles, muscles);
-  left.diagonal().array() += options_.effort + options_.change;
+  const double calm = options_.calm / (1 + std::pow(error / options_.calm_error, 2));
+  left.diagonal().array() += options_.effort * (1 + calm) + options_.change;
   const Eigen::VectorXd right = options_.change * previous_ - normal_.row(muscles).head(muscles).transpose();
   previous_ = solve_within_cones(left, right, cones_, options_.cone_weight);
   activation += muscles_.fields * previous_;

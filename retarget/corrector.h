@@ -13,6 +13,8 @@ struct CorrectorOptions {
   double node_weight = 0.2;     // of the mass rows
   double root_weight = 6;       // of the six rows of momentum
   double effort = 5;            // eps, per squared muscle, with speeds per sqrt(g L)
+  double calm = 3;              // how many times dearer effort gets as the error of momentum vanishes,
+  double calm_error = 0.01;     // halfway at this error, in speeds per sqrt(g L)
   double change = 1e-3;         // eps_d, per squared change of a muscle
   double cone_weight = 10;      // per m g by which the force at a point that is to bear load would leave its friction cone
   double foot_weight = 4;       // of the rows of a foot in the air
@@ -35,7 +37,8 @@ struct ContactNow {
 ///
 /// dv_free = A^-1 [M ev + Th (f_int(x; a_ff) - f_int(x_ref; a_ff))], A = M + Th D + Th^2 (K + Kc on the points that touch
 /// now), min_w |W (dv_free + A^-1 Th B Phi w + ex / tau)|^2 + eps |w|^2 + eps_d |w - w_previous|^2 + the squared excess of
-/// contact forces over their cones (contact_cones.h). W weighs the nodes by mass, the six rows of momentum, and the mean of
+/// contact forces over their cones (contact_cones.h). Effort is dear while the error is small, for a creature on a narrow base
+/// sways against a gain that a push calls for. W weighs the nodes by mass, the six rows of momentum, and the mean of
 /// each foot in the air, which is sent to where the centre of mass can be caught: its error moves by e + c sqrt(h / g) e'
 /// with the error e of the centre of mass over the ground and its height h. Sources: the design, section 8; Raibert, "Legged
 /// Robots That Balance", 1986, for the placement of feet by speed; Pratt et al., "Capture Point: A Step toward Humanoid Push
@@ -67,7 +70,7 @@ class Corrector {
   bool factor_system(const physics::State& state, const ContactNow& contact);
   void respond(const physics::State& state, const physics::State& reference);
   void weigh_nodes();
-  void weigh_momentum(const physics::State& state, double grip);
+  double weigh_momentum(const physics::State& state, double grip);
   void weigh_feet(const physics::State& state, const physics::State& reference, const std::vector<const Patch*>& in_air);
 
   const physics::Scene& scene_;

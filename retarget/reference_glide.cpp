@@ -11,13 +11,6 @@ constexpr double kTurn = 0.1;                         // [rad] at the full reach
 constexpr double kLeak = 0.3;                         // [1/s]
 constexpr double kSpeed = 0.15;                       // of the target's RMS speed
 
-bool is_dragged(const ContactSchedule& contacts) {
-  const auto slides = [](const std::vector<ContactState>& states) {
-    return std::find(states.begin(), states.end(), ContactState::kSlide) != states.end();
-  };
-  return std::any_of(contacts.state.begin(), contacts.state.end(), slides);
-}
-
 }  // namespace
 
 double yaw_of(const Eigen::Matrix3d& rotation) {

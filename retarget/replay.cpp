@@ -8,6 +8,7 @@
 #include "retarget/fall.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
+#include "retarget/stride_feedback.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -44,6 +45,7 @@ class Run {
  private:
   void look_at_contacts();
   void control();
+  void activate(double share_of_step);
   physics::Termination advance();
   void write_trace(long row);
   void measure(long step);
@@ -59,11 +61,14 @@ class Run {
   const std::unique_ptr<physics::Stepper> stepper_;
   Corrector corrector_;
   ReferenceGlide glide_;
+  StrideFeedback stride_;
 
   double time_s_ = 0, busy_s_ = 0, correction_ = 0;
   physics::State state_, reference_, glided_;
   RigidFit fit_;                                // from reference_ to state_
-  Eigen::VectorXd activation_;                  // E
+  Eigen::VectorXd activation_;                  // E, of a solver step
+  Eigen::VectorXd mean_activation_;             // E, of a control step
+  Eigen::VectorXd feedback_;                    // E, what the corrector adds in this control step
   ContactNow contact_;
   physics::Impulses impulses_, step_impulses_;  // of a solver step, of a control step
   Eigen::Matrix3Xd effect_;                     // [N]
@@ -87,8 +92,11 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       stepper_(physics::make_stepper(options.method, input.scene)),
       corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
+      stride_(input.prepared, input.length, input.scene.body.edge_count(), input.feed_forward),
       state_(first_state(target_, curve_)),
       activation_(input.scene.body.edge_count()),
+      mean_activation_(activation_.size()),
+      feedback_(Eigen::VectorXd::Zero(activation_.size())),
       contact_(first_contact(input.prepared.contacts)),
       impulses_(physics::make_impulses(input.scene)),
       step_impulses_(impulses_),
@@ -98,7 +106,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       frames_{column(state_.x)} {
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);
-  input.feed_forward(0, activation_);
+  input.feed_forward(0, mean_activation_);
   physics::clear(step_impulses_);
   write_trace(0);
 }
@@ -125,28 +133,44 @@ void Run::look_at_contacts() {
   }
 }
 
-/// The activations for the coming control step.
+/// The correction for the coming control step.
 void Run::control() {
   curve_.at(time_s_, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
-  input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
   correction_ = 0;
   if (!options_.correct) return;
   glided_ = reference_;
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
+  stride_.follow(fit_.mean_a, fit_.mean_b, control_s_);
   look_at_contacts();
+  input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
+  stride_.apply(activation_);
+  feedback_ = -activation_;
   correction_ = corrector_.correct(state_, glided_, contact_, activation_);
+  feedback_ += activation_;
+}
+
+/// The activations at a time within the control step: signals that are held would come in jerks, which shake feet loose that hold
+/// by friction. Feedback comes at once, for what comes later balances worse.
+void Run::activate(double share_of_step) {
+  input_.feed_forward(time_s_ + share_of_step * control_s_, activation_);
+  stride_.apply(activation_);
+  activation_ += feedback_;
+  activation_ = activation_.cwiseMax(1 - input_.limit).cwiseMin(1 + input_.limit);
 }
 
 physics::Termination Run::advance() {
   physics::clear(step_impulses_);
+  mean_activation_.setZero();
   physics::Termination termination = physics::Termination::kDone;
   for (int k = 0; k < options_.steps_per_control; ++k) {
     const double begin = time_s_ + k * options_.step_s;
     const Eigen::Vector3d pushed = pushed_velocity(options_.pushes, begin, begin + options_.step_s);
     const bool has_effect = !pushed.isZero(0);
     if (has_effect) effect_ = (pushed / options_.step_s) * input_.scene.body.mass.transpose();
+    activate((k + 0.5) / options_.steps_per_control);
+    mean_activation_ += activation_ / options_.steps_per_control;
     termination = stepper_->step(options_.step_s, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
     physics::add(impulses_, step_impulses_);
     if (termination == physics::Termination::kDiverged) break;
@@ -160,7 +184,7 @@ void Run::write_trace(long row) {
   trace.time_s[row] = time_s_;
   trace.position.col(row) = column(state_.x);
   trace.velocity.col(row) = column(state_.v);
-  trace.activation.col(row) = activation_;
+  trace.activation.col(row) = mean_activation_;
   trace.contact_force.col(row) = column(step_impulses_.contact_nodes) / control_s_;
   trace.effect_force.col(row) = column(step_impulses_.effect_nodes) / control_s_;
   trace.contact_moment.col(row) = step_impulses_.contact_moment / control_s_;
@@ -174,7 +198,7 @@ void Run::measure(long step) {
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   contact_.touching = point_states(input_.scene, state_, step_impulses_.contact, thresholds_);
   contact_.force = step_impulses_.contact / control_s_;
-  metrics_.add({time_s_, state_, reference_, fit_, activation_, correction_, step_impulses_, contact_.touching});
+  metrics_.add({time_s_, state_, reference_, fit_, mean_activation_, correction_, step_impulses_, contact_.touching});
 }
 
 Replay Run::play() {

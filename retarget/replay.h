@@ -13,8 +13,8 @@ namespace hydrostat::retarget {
 
 struct ReplayOptions {
   double duration_s = 9;
-  double step_s = 1.0 / 240;    // outer step of the solver
-  int steps_per_control = 2;    // 120 Hz
+  double step_s = 1.0 / 480;    // outer step of the solver, over which activations are held
+  int steps_per_control = 4;    // 120 Hz
   physics::Method method = physics::Method::kExplicit;
   bool correct = true;
   CorrectorOptions corrector;

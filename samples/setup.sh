@@ -7,7 +7,7 @@ set -euo pipefail
 packages=(
   ca-certificates build-essential g++ cmake ninja-build ccache
   libassimp-dev libceres-dev libeigen3-dev libfftw3-dev libopenvdb-dev libboost-dev libboost-iostreams-dev libtbb-dev
-  nlohmann-json3-dev libcli11-dev libssl-dev libtinygltf-dev libtomlplusplus-dev libgtest-dev
+  nlohmann-json3-dev libcli11-dev libssl-dev libtinygltf-dev libtomlplusplus-dev libseccomp-dev libgtest-dev
 )
 # Node may come from elsewhere, with its npm.
 command -v node >/dev/null || packages+=(nodejs)

@@ -29,7 +29,8 @@ void set_variant(const std::string& variant, retarget::CorrectorOptions& options
                                              {"nodes", &options.node_weight},   {"root", &options.root_weight},
                                              {"horizon", &options.horizon_s}, {"cone", &options.cone_weight},
                                              {"foot", &options.foot_weight},  {"foot_settle", &options.foot_settle_s},
-                                             {"step", &options.step},         {"ahead", &options.step_ahead}};
+                                             {"step", &options.step},         {"ahead", &options.step_ahead},
+                                             {"calm", &options.calm},         {"calm_error", &options.calm_error}};
   std::istringstream parts(variant);
   for (std::string part; std::getline(parts, part, ':');) {
     if (part == "usual") continue;

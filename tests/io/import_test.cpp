@@ -35,7 +35,7 @@ std::string assets() {
 
 class ImportEnvironment : public testing::Environment {
   void SetUp() override {
-    set_import_worker_executable(HYDROSTAT_BINARY);
+    set_import_worker_executable((std::filesystem::path(HYDROSTAT_BINARY).parent_path() / "hydrostat-import").string());
     if (assets().empty())
       std::cout << "Tests on third-party clips are left out: HYDROSTAT_ASSETS names no directory that holds them.\n";
   }
@@ -384,7 +384,6 @@ TEST(InfoCommand, RefusesBadInputWithOneSentenceAndExitCodeOne) {
   const std::string prose = write_file(directory.path() + "/notes.fbx", "This is no clip.\n");
   const std::vector<std::pair<std::string, std::string>> refused{
       {directory.path() + "/missing.glb", "there is no such file"},
-      {directory.path(), "it is not a file"},
       {prose, "it cannot be read"},
       {write_file(directory.path() + "/notes.glb", "This is no clip.\n"), "no whole glTF"},
       {write_file(directory.path() + "/empty.fbx", ""), "it is empty"},
@@ -396,6 +395,48 @@ TEST(InfoCommand, RefusesBadInputWithOneSentenceAndExitCodeOne) {
     EXPECT_NE(outcome.text.find(what), std::string::npos) << outcome.text;
     EXPECT_EQ(std::count(outcome.text.begin(), outcome.text.end(), '\n'), 1) << outcome.text;
   }
+}
+
+TEST(InfoCommand, OfADirectoryTellsARowForEachFile) {
+  const Outcome table = run("info " + kSamples);
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_EQ(std::count(table.text.begin(), table.text.end(), '\n'), 4) << table.text;
+  const TemporaryDirectory directory;
+  EXPECT_NE(run("info " + directory.path()).text.find("holds no clip file"), std::string::npos);
+  write_file(directory.path() + "/notes.glb", "This is no clip.\n");
+  const Outcome refused = run("info --json " + directory.path());
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(nlohmann::json::parse(refused.text).at("files").at(0).at("error").get<std::string>().find("no whole glTF"),
+            std::string::npos);
+}
+
+TEST(InfoCommand, TellsWhatAnAnimatorAsks) {
+  const FileInfo trot = inspect(kSamples + "/boxdog_trot.fbx");
+  const ClipInfo& clip = trot.clips.front();
+  EXPECT_LT(clip.closure_defect_length, 0.001);
+  EXPECT_GT(clip.max_strain, 0.05);
+  EXPECT_LT(clip.max_strain, 1);
+  ASSERT_EQ(clip.contacts.size(), 4u);  // its paws
+  for (const ContactInfo& contact : clip.contacts) {
+    EXPECT_GT(contact.duty, 0.3) << contact.bone;
+    EXPECT_LT(contact.duty, 0.8) << contact.bone;
+  }
+}
+
+TEST(InfoCommand, UnitAndAxisOfTheUserStand) {
+  const std::string path = kSamples + "/worm_crawl.glb";
+  const FileInfo as_is = inspect(path), turned = inspect(path, {.up = "z", .metres_per_unit = 2});
+  const BoxInfo &a = as_is.clips[0].bbox[0], &b = turned.clips[0].bbox[0];
+  EXPECT_LT((2 * Eigen::Vector3d(a.min.x(), a.min.z(), -a.max.y()) - b.min).norm(), 1e-9);
+  EXPECT_LT((2 * Eigen::Vector3d(a.max.x(), a.max.z(), -a.min.y()) - b.max).norm(), 1e-9);
+  EXPECT_EQ(turned.up, "z");
+}
+
+TEST(InfoCommand, TheReaderSeesNothingElseAndIsHeldToItsLimits) {
+  const FileInfo info = inspect(kSamples + "/worm_crawl.glb");
+  EXPECT_TRUE(info.network_confined);  // Landlock is the kernel's choice, seccomp is in all
+  const Outcome slow = run("info " + kSamples + "/boxdog_trot.fbx --import-memory 0.1");
+  EXPECT_EQ(slow.exit_code, 2);
 }
 
 TEST(InfoCommand, RefusesAnUnknownOptionWithExitCodeTwo) {
@@ -411,39 +452,20 @@ struct GoldenFile {
 };
 std::ostream& operator<<(std::ostream& out, const GoldenFile& file) { return out << file.name; }
 
-/// Files with golden boxes and how near ours are. Above 0.3 %: Euler curves between sparse keys are lost in assimp.
+/// Files with golden boxes and how near ours are. Above 0.3 % where assimp loses the curves between keys, and where the
+/// golden box holds a mesh that is not the character's; the clips that are then off are told of.
 std::vector<GoldenFile> golden_files() {
   if (assets().empty()) return {};
   std::vector<GoldenFile> files;
-  for (const char* name : {"gltf/fox.glb",
-                           "gltf/snake.glb",
-                           "gltf/cesium_man.gltf",
-                           "gltf/rigged_simple.gltf",
-                           "gltf/rigged_simple_u8_weights.gltf",
-                           "gltf/simple_skin_step.gltf",
-                           "gltf/spider_animated.gltf",
-                           "gltf/greenman.glb",
-                           "gltf/platformer_enemy.glb",
-                           "fbx/slime.fbx",
-                           "fbx/manta_ray.fbx",
-                           "fbx/blender_sausage_unit100.fbx",
-                           "fbx/animation_with_skeleton.fbx",
-                           "collada/cowboy.dae",
-                           "collada/cylinder_animated_from_3ds_max.dae",
-                           "made/worm_crawl.fbx",
-                           "made/worm_crawl.glb",
-                           "made/worm_crawl_zup_units.fbx",
-                           "made/boxdog_trot.fbx",
-                           "made/boxdog_trot.glb",
-                           "made/boxdog_trot.dae",
-                           "made/boxdog_jump.fbx",
-                           "made/boxdog_jump.glb",
-                           "made/boxdog_two_clips.fbx"}) {
-    files.push_back({name, 0.003});
-  }
-  for (const char* name :
-       {"fbx/frog.fbx", "fbx/alien_14_clips.fbx", "fbx/robot_same_names.fbx", "fbx/maya_sausage_3_takes.fbx"}) {
-    files.push_back({name, 0.0121});
+  const std::map<std::string, double> loose{{"fbx/frog.fbx", 0.0121},
+                                            {"fbx/alien_14_clips.fbx", 0.0121},
+                                            {"fbx/robot_same_names.fbx", 0.0121},
+                                            {"fbx/maya_sausage_3_takes.fbx", 0.0121},
+                                            {"fbx/max_transformed_skin_zup.fbx", 0.08},  // two keys, 3.3 s apart
+                                            {"fbx/maya_slime.fbx", 0.25}};               // a second body that nothing moves
+  const nlohmann::json golden = nlohmann::json::parse(std::ifstream(assets() + "/golden_bbox.json"));
+  for (const auto& [name, file] : golden.at("files").items()) {
+    files.push_back({name, loose.contains(name) ? loose.at(name) : 0.003});
   }
   std::erase_if(files, [](const GoldenFile& file) { return !std::filesystem::exists(assets() + "/" + file.name); });
   return files;
@@ -465,16 +487,26 @@ TEST_P(GoldenClip, StandsWhereOtherReadersSeeIt) {
   const FileInfo info = inspect(assets() + "/" + GetParam().name);
   ASSERT_EQ(info.clips.size(), golden.at("clips").size());
   const bool z_up = golden.at("axes") != "Y up" && info.up == "z";
+  // BVH has no unit: the boxes are in that which the importer took.
+  const double unit_m =
+      golden.at("metres_per_unit").is_null() ? info.metres_per_unit : golden.at("metres_per_unit").get<double>();
+  EXPECT_DOUBLE_EQ(unit_m, info.metres_per_unit);
   for (std::size_t c = 0; c < info.clips.size(); ++c) {
     const nlohmann::json& wanted = golden.at("clips").at(c);
     SCOPED_TRACE("clip " + info.clips[c].name);
     EXPECT_EQ(info.clips[c].name, wanted.at("name").get<std::string>());
     EXPECT_NEAR(info.clips[c].duration_s, wanted.at("duration_s").get<double>(), 1e-3);
+    double worst = 0;
     for (std::size_t f = 0; f < info.clips[c].bbox.size(); ++f) {
-      EXPECT_LT(misfit(info.clips[c].bbox[f], in_metres_y_up(wanted.at("bbox").at(f), golden.at("metres_per_unit"), z_up)),
-                GetParam().tolerance)
-          << "fraction " << info.clips[c].bbox[f].fraction;
+      worst = std::max(worst, misfit(info.clips[c].bbox[f], in_metres_y_up(wanted.at("bbox").at(f), unit_m, z_up)));
     }
+    EXPECT_LT(worst, GetParam().tolerance);
+    const bool told = std::any_of(info.warnings.begin(), info.warnings.end(), [&](const std::string& warning) {
+      const bool lost = warning.starts_with("Clip '" + info.clips[c].name + "', bone '") &&
+                        warning.find("before export") != std::string::npos;
+      return lost || warning.find("left out: 'Slime_002:Slime_Body_high'") != std::string::npos;
+    });
+    EXPECT_TRUE(worst < 0.003 || told) << "off by " << worst << " and not told";
   }
 }
 
@@ -484,8 +516,8 @@ TEST_P(GoldenClip, SkinningTheCharacterKeepsTheFirstBox) {
   const retarget::Character character = import_character(path, "", {});
   const ClipInfo& clip = info.clips[static_cast<std::size_t>(character.clip.index)];
   const Box first = box_of(skin_positions(character.skeleton, character.skin, character.clip.bone_pose.front()));
-  // Before the first key the clip holds still.
-  EXPECT_LT(misfit(clip.bbox.front(), first), 1e-5);
+  // Before the first key the clip holds still. Capsules reach beyond the joints that info tells of.
+  EXPECT_LT(misfit(clip.bbox.front(), first), info.meshes.empty() ? 0.08 : 1e-5);
 }
 
 std::string test_name(const testing::TestParamInfo<GoldenFile>& file) {
@@ -530,8 +562,8 @@ std::vector<GoldenFile> hostile_files() {
        {"broken/assert_abort.fbx", "broken/Animation_Skin_04.gltf", "broken/fox_truncated.glb", "broken/fuzz_0100.fbx",
         "broken/fuzz_0739.fbx", "broken/huge_count.dae", "broken/inf_nan_ascii.fbx", "broken/old_version_6100_ascii.fbx",
         "broken/recursive_nodes.gltf", "broken/rigged_simple_bind_short.gltf", "broken/rigged_simple_cubic_too_short.gltf",
-        "broken/rigged_simple_nan_time.gltf", "broken/rigged_simple_unsorted_times.gltf", "fbx/maya_pivot_offset.fbx",
-        "gltf/AnimatedMorphCube.gltf", "gltf/interpolation_test.gltf"}) {
+        "broken/rigged_simple_nan_time.gltf", "broken/rigged_simple_unsorted_times.gltf", "gltf/AnimatedMorphCube.gltf",
+        "gltf/interpolation_test.gltf"}) {
     if (!assets().empty() && std::filesystem::exists(assets() + "/" + name)) files.push_back({name, 0});
   }
   return files;

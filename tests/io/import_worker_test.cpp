@@ -22,7 +22,7 @@ std::string complaint_with_worker(const std::string& script) {
   set_import_worker_executable(path.string());
   std::string complaint;
   try {
-    read_in_worker(kClip, std::chrono::milliseconds(300));
+    read_in_worker(kClip, {.time_s = 0.3});
   } catch (const Error& error) {
     EXPECT_EQ(error.file, kClip);
     EXPECT_FALSE(error.mend.empty());

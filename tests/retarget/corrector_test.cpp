@@ -158,6 +158,7 @@ TEST(Corrector, DoesNotPullAtTheGround) {
     double least[2];
     for (const bool with_cones : {false, true}) {
       CorrectorOptions options;
+      options.calm = 0;
       if (!with_cones) options.cone_weight = 0;
       Corrector corrector = controlled.corrector(options);
       Eigen::VectorXd activation = controlled.passive;
@@ -214,17 +215,23 @@ TEST(Corrector, KeepsToTheLimit) {
   }
 }
 
-TEST(Corrector, AnswersTwiceTheErrorWithTwiceTheMuscles) {
+TEST(Corrector, AnswersTwiceTheErrorWithTwiceTheMusclesOrWithMoreWhereItIsCalm) {
   const Controlled controlled;
-  physics::State once = controlled.rest, twice = controlled.rest;
-  once.v.colwise() += Eigen::Vector3d(0.05, 0, 0.02);
-  twice.v.colwise() += Eigen::Vector3d(0.1, 0, 0.04);
-  Eigen::VectorXd activation = controlled.passive;
-  Corrector a = controlled.corrector(), b = controlled.corrector();
-  a.correct(once, controlled.rest, controlled.standing, activation);
-  activation = controlled.passive;
-  b.correct(twice, controlled.rest, controlled.standing, activation);
-  EXPECT_LT((2 * a.muscles_now() - b.muscles_now()).norm(), 1e-9 * b.muscles_now().norm());
+  const auto answer = [&](double share, double calm) {
+    physics::State state = controlled.rest;
+    state.v.colwise() += share * Eigen::Vector3d(0.05, 0, 0.02);
+    CorrectorOptions options;
+    options.calm = calm;
+    Corrector corrector = controlled.corrector(options);
+    Eigen::VectorXd activation = controlled.passive;
+    corrector.correct(state, controlled.rest, controlled.standing, activation);
+    return corrector.muscles_now();
+  };
+  EXPECT_LT((2 * answer(1, 0) - answer(2, 0)).norm(), 1e-9 * answer(2, 0).norm());
+  const double usual = CorrectorOptions().calm;
+  EXPECT_GT(answer(2, usual).norm(), 2.1 * answer(1, usual).norm());
+  EXPECT_LT(answer(0.01, usual).norm(), 0.9 * answer(0.01, 0).norm());
+  EXPECT_GT(answer(10, usual).norm(), 0.98 * answer(10, 0).norm());
 }
 
 TEST(Corrector, LessEffortIsSpentWhereItCostsMore) {

@@ -142,6 +142,21 @@ TEST(Replay, IsTheSameEveryTime) {
   EXPECT_EQ(first.report.shape_rms_length, again.report.shape_rms_length);
 }
 
+TEST(Replay, SignalsRunOnBetweenControlSteps) {
+  const Actor actor;
+  ReplayInput input = actor.input();
+  input.feed_forward = [](double time, Eigen::VectorXd& activation) { activation.setConstant(1 + 0.2 * std::sin(40 * time)); };
+  ReplayOptions often = lasting(0.2, /*correct=*/false), seldom = often;
+  often.steps_per_control = 2;
+  seldom.steps_per_control = 8;
+  const Trace a = replay(input, often).trace, b = replay(input, seldom).trace;
+  ASSERT_EQ(a.position.cols(), 4 * (b.position.cols() - 1) + 1);
+  for (Eigen::Index row = 1; row < b.position.cols(); ++row) {
+    EXPECT_LT((a.position.col(4 * row) - b.position.col(row)).norm(), 1e-9) << "row " << row;
+    EXPECT_NEAR(a.activation.middleCols(4 * row - 3, 4).mean(), b.activation.col(row).mean(), 1e-12) << "row " << row;
+  }
+}
+
 TEST(Replay, TheCorrectorBringsAPushedBodyBack) {
   const Actor actor;
   ReplayOptions options = lasting(4, true);

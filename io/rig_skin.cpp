@@ -1,0 +1,158 @@
+#include "io/rig_skin.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+namespace hydrostat::io {
+namespace {
+
+constexpr double kWeldGrid = 1e-6;    // relative to the skin's extent
+constexpr double kWeightGrid = 1e-3;  // difference of skin weights that keeps vertices apart
+constexpr double kNoWeight = 1e-6;    // sum of skin weights below which a vertex has none
+constexpr std::size_t kMostCompared = 64;
+
+int nearest_bone(const retarget::Skeleton& skeleton, const Eigen::Vector3d& point) {
+  double least = std::numeric_limits<double>::infinity();
+  int nearest = -1;
+  const auto consider = [&](int bone, double distance) {
+    if (distance >= least || !skeleton.weighted[static_cast<std::size_t>(bone)]) return;
+    least = distance;
+    nearest = bone;
+  };
+  for (int b = 0; b < skeleton.count(); ++b) {
+    const Eigen::Vector3d end = skeleton.bind_pose[static_cast<std::size_t>(b)].translation();
+    consider(b, (point - end).norm());
+    const int parent = skeleton.parents[static_cast<std::size_t>(b)];
+    if (parent < 0) continue;
+    const Eigen::Vector3d start = skeleton.bind_pose[static_cast<std::size_t>(parent)].translation();
+    const double along = (point - start).dot(end - start) / std::max((end - start).squaredNorm(), 1e-300);
+    consider(parent, (point - start - std::clamp(along, 0.0, 1.0) * (end - start)).norm());
+  }
+  return nearest;
+}
+
+/// Binds every vertex without weights to the weighted bone whose origin, or line to a child, is nearest.
+void bind_stray_vertices(Rig& rig) {
+  int strays = 0;
+  for (Eigen::Index v = 0; v < rig.skin.vertices.cols(); ++v) {
+    std::vector<retarget::SkinnedMesh::Influence>& influences = rig.skin.skin_weights[static_cast<std::size_t>(v)];
+    if (!influences.empty()) continue;
+    influences.push_back({nearest_bone(rig.skeleton, rig.skin.vertices.col(v)), 1});
+    ++strays;
+  }
+  if (strays > 0)
+    rig.warnings.push_back(std::to_string(strays) + " vertices have no skin weights; each goes with the nearest bone.");
+}
+
+/// Both lists are sorted by bone.
+bool weights_agree(const std::vector<retarget::SkinnedMesh::Influence>& a,
+                   const std::vector<retarget::SkinnedMesh::Influence>& b) {
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
+           return x.bone == y.bone && std::abs(x.weight - y.weight) < kWeightGrid;
+         });
+}
+
+/// Makes one vertex of those that share place and weights (seams of texture and normals), and drops triangles that
+/// collapse.
+void weld(retarget::SkinnedMesh& skin) {
+  const double grid = kWeldGrid * std::max(extent_of(skin.vertices), 1e-12);
+  using Place = std::array<long long, 3>;
+  std::map<Place, std::vector<int>> welded_at;
+  std::vector<int> now(static_cast<std::size_t>(skin.vertices.cols()));
+  retarget::SkinnedMesh welded;
+  welded.vertices.resize(3, skin.vertices.cols());
+  for (Eigen::Index v = 0; v < skin.vertices.cols(); ++v) {
+    const auto& weights = skin.skin_weights[static_cast<std::size_t>(v)];
+    Place place;
+    for (int axis = 0; axis < 3; ++axis) place[static_cast<std::size_t>(axis)] = std::llround(skin.vertices(axis, v) / grid);
+    std::vector<int>& here = welded_at[place];
+    // Where a hostile file heaps up vertices of all weights, the first few are compared.
+    const auto end = here.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(here.size(), kMostCompared));
+    const auto same = std::find_if(here.begin(), end, [&](int other) {
+      return weights_agree(weights, welded.skin_weights[static_cast<std::size_t>(other)]);
+    });
+    if (same == end) {
+      here.push_back(static_cast<int>(welded.skin_weights.size()));
+      welded.vertices.col(here.back()) = skin.vertices.col(v);
+      welded.skin_weights.push_back(weights);
+      now[static_cast<std::size_t>(v)] = here.back();
+    } else {
+      now[static_cast<std::size_t>(v)] = *same;
+    }
+  }
+  welded.vertices.conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(welded.skin_weights.size()));
+  welded.triangles.resize(3, skin.triangles.cols());
+  Eigen::Index kept = 0;
+  for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
+    const Eigen::Vector3i corners = skin.triangles.col(t).unaryExpr([&](int v) { return now[static_cast<std::size_t>(v)]; });
+    const bool flat = corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
+    if (!flat) welded.triangles.col(kept++) = corners;
+  }
+  welded.triangles.conservativeResize(Eigen::NoChange, kept);
+  skin = std::move(welded);
+}
+
+/// Turns the triangles of a closed skin round where they face inward.
+void face_outward(Rig& rig) {
+  retarget::SkinnedMesh& skin = rig.skin;
+  std::set<std::pair<int, int>> edges;
+  double volume = 0;
+  for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
+    const Eigen::Vector3i corners = skin.triangles.col(t);
+    for (int c = 0; c < 3; ++c) edges.emplace(corners[c], corners[(c + 1) % 3]);
+    const Eigen::Vector3d a = skin.vertices.col(corners[0]), b = skin.vertices.col(corners[1]),
+                          c = skin.vertices.col(corners[2]);
+    volume += a.dot(b.cross(c)) / 6;
+  }
+  const bool closed = std::all_of(edges.begin(), edges.end(), [&](const std::pair<int, int>& edge) {
+    return edges.contains({edge.second, edge.first});
+  });
+  if (!closed || volume >= 0) return;
+  skin.triangles.row(1).swap(skin.triangles.row(2));
+  rig.warnings.push_back("The skin's triangles face inward; they are turned round.");
+}
+
+}  // namespace
+
+double extent_of(const Eigen::Matrix3Xd& points) {
+  return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).maxCoeff();
+}
+
+void add_mesh(const SceneMesh& mesh, const Eigen::Affine3d& into_bind, const std::vector<int>& bones, Rig& rig) {
+  retarget::SkinnedMesh& skin = rig.skin;
+  const Eigen::Index first = skin.vertices.cols(), first_triangle = skin.triangles.cols();
+  skin.vertices.conservativeResize(Eigen::NoChange, first + mesh.vertices.cols());
+  skin.vertices.rightCols(mesh.vertices.cols()) = rig.to_ours * into_bind * mesh.vertices;
+  skin.triangles.conservativeResize(Eigen::NoChange, first_triangle + mesh.triangles.cols());
+  skin.triangles.rightCols(mesh.triangles.cols()) = mesh.triangles.array() + static_cast<int>(first);
+  if (into_bind.linear().determinant() < 0) {
+    skin.triangles.rightCols(mesh.triangles.cols()).row(1).swap(skin.triangles.rightCols(mesh.triangles.cols()).row(2));
+  }
+  std::vector<std::map<int, double>> sums(static_cast<std::size_t>(mesh.vertices.cols()));
+  for (std::size_t j = 0; j < mesh.joints.size(); ++j) {
+    for (const SceneMesh::Weight& weight : mesh.joints[j].weights) {
+      sums[static_cast<std::size_t>(weight.vertex)][bones[j]] += weight.weight;
+    }
+  }
+  for (const std::map<int, double>& weights : sums) {
+    double total = 0;
+    for (const auto& [bone, weight] : weights) total += weight;
+    std::vector<retarget::SkinnedMesh::Influence> influences;
+    for (const auto& [bone, weight] : weights) {
+      if (total > kNoWeight && weight > 0) influences.push_back({bone, weight / total});
+    }
+    skin.skin_weights.push_back(std::move(influences));
+  }
+}
+
+void finish_skin(Rig& rig) {
+  bind_stray_vertices(rig);
+  weld(rig.skin);
+  face_outward(rig);
+}
+
+}  // namespace hydrostat::io

@@ -20,13 +20,13 @@ void report_replays(const retarget::Performances& performances, retarget::RunRep
   if (performances.naive) report.naive = performances.naive->report;
   if (performances.open_loop) report.open_loop = performances.open_loop->report;
   if (performances.closed_loop) report.closed_loop = performances.closed_loop->report;
-  report.outcome_ok = !is_down(performances.main());
+  report.outcome_ok = !is_down(performances.main()) && report.accuracy.is_met();
 }
 
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
                    const retarget::Performances& performances, const retarget::RunReport& report) {
   const retarget::Replay& run = performances.main();
-  const bool down = is_down(run);
+  const bool down = !report.outcome_ok;
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
                         {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
                         performer.scene.body.mass, run.motion, {});

@@ -98,12 +98,10 @@ void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, ret
   signals.force = signal::truncated(signals.force, kept, retarget::SignalOptions().roll_off);
 }
 
-retarget::AccuracyReport told(const ChosenStep& chosen, retarget::AccuracyReport report) {
+retarget::AccuracyReport told(const ChosenStep& chosen) {
+  retarget::AccuracyReport report = chosen.report;
   report.method = physics::name_of(chosen.setting.method);
-  if (report.dt_s == 0) report.dt_s = chosen.setting.dt_s;
-  report.estimated_error_length = chosen.report.estimated_error_length;
-  report.max_error_length = chosen.report.max_error_length;
-  report.work_saved = chosen.report.work_saved;
+  report.dt_s = chosen.setting.dt_s;
   return report;
 }
 

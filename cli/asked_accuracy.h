@@ -39,7 +39,7 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
 /// Steps of a replay, whose control takes kControlSeconds.
 void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting);
 /// What a report tells of an accuracy, with what was chosen.
-retarget::AccuracyReport told(const ChosenStep& chosen, retarget::AccuracyReport report = {});
+retarget::AccuracyReport told(const ChosenStep& chosen);
 
 /// accuracy.csv and accuracy.svg of what was tried.
 void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve);

@@ -337,6 +337,7 @@ class Conversion {
       target_.report.signals = signals_report(signals_);
       target_.report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
       signals_text_ = io::signals_text(signals_);
+      target_file_ = io::target_bytes(target_);
       return 0;
     });
   }
@@ -351,11 +352,10 @@ class Conversion {
     key_ = key_after(key_, signals_text_, physics::name_of(perform_options.replay.method), std::int64_t{options_.seed});
     if (chosen_) key_ = key_after(key_, perform_options.replay.step_s);
     performances_ = stages_.run("replay", key_, [&] { return retarget::perform(target_.performer, signals_, perform_options); });
+    if (chosen_) target_.report.accuracy = told(*chosen_);
     report_replays(performances_, target_.report);
     stages_.run("measurement", [&] {
       measure(target_.performer, signals_, perform_options, target_.report);
-      if (chosen_) target_.report.accuracy = told(*chosen_, target_.report.accuracy);
-      report_replays(performances_, target_.report);
       return 0;
     });
   }
@@ -374,8 +374,7 @@ class Conversion {
       return 0;
     });
     target_.report.timing_s = stages_.timing_s;
-    write_outcome(writer_, performer, signals_, performances_, target_.report);
-    if (chosen_) write_curve(writer_, chosen_->curve);
+    write_outcome(writer_, performer, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
   }
 
   const ConvertOptions& options_;

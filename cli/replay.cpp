@@ -140,15 +140,14 @@ int replay(const ReplayCommand& command) {
   report.signals = signals_report(creature.signals);
   report.signals.error_rms_l0 = signal_error;
   stages.run("measurement", [&] {
+    report.accuracy = chosen ? told(*chosen) : retarget::AccuracyReport();
     measure(performer, creature.signals, options, report);
-    if (chosen) report.accuracy = told(*chosen, report.accuracy);
     return 0;
   });
   report_replays(performances, report);
   report.timing_s = stages.timing_s;
   try {
-    write_outcome(*writer, performer, creature.signals, performances, report);
-    if (chosen) write_curve(*writer, chosen->curve);
+    write_outcome(*writer, performer, creature.signals, performances, report, chosen ? &chosen->curve : nullptr);
   } catch (const Error& error) {
     throw writer->as_seen(error);
   }

@@ -142,12 +142,14 @@ io::CreatureRecord record_of(const io::SceneFile& scene, const retarget::RunRepo
 }
 
 void write_files(io::CreatureWriter& writer, const io::SceneFile& scene, const retarget::Simulation& simulation,
-                 const retarget::RunReport& report) {
+                 const retarget::RunReport& report, const std::optional<ChosenStep>& chosen) {
   writer.write("creature.toml", io::to_toml(record_of(scene, report)));
   writer.write("body.json", io::scene_body_text(scene));
   writer.write("report.json", io::report_json(report));
   io::write_simulation_glb(writer.directory() / (report.outcome_ok ? "replay.glb" : "failed.glb"), scene, simulation);
-  io::write_simulation_page(writer.directory() / "report.html", scene, simulation, report);
+  io::write_simulation_page(writer.directory() / "report.html", scene, simulation, report,
+                            chosen ? io::accuracy_svg(chosen->curve) : "");
+  if (chosen) write_curve(writer, chosen->curve);
 }
 
 std::string summary(const retarget::RunReport& report, const std::string& where) {
@@ -216,8 +218,7 @@ int simulate(const SimulateCommand& command) {
   report.warnings = scene.warnings;
   report.timing_s = stages.timing_s;
   try {
-    write_files(writer, scene, simulation, report);
-    if (chosen) write_curve(writer, chosen->curve);
+    write_files(writer, scene, simulation, report, chosen);
   } catch (const Error& error) {
     throw writer.as_seen(error);
   }

@@ -138,7 +138,10 @@ std::string accuracy_csv(const AccuracyCurve& curve) {
   return csv;
 }
 
-std::string accuracy_svg(const AccuracyCurve& curve) {
+namespace {
+
+/// `has_links`: every point leads to `#row<n>`.
+std::string diagram(const AccuracyCurve& curve, bool has_links) {
   Axis x(kLeft, kWidth - kRight), y(kHeight - kBottom, kTop);
   for (const AccuracyRow& row : curve.rows) {
     if (!row.stable) continue;
@@ -180,14 +183,15 @@ std::string accuracy_svg(const AccuracyCurve& curve) {
     if (std::find(methods.begin(), methods.end(), row.method) == methods.end()) methods.push_back(row.method);
     const std::string at =
         "cx=\"" + number(x.at(row.ms_per_sim_s), 5) + "\" cy=\"" + number(y.at(row.error_rel_length), 5) + "\"";
-    svg += "<a href=\"#row" + std::to_string(k) + "\"><title>" + escaped(name_of(row)) + ": " +
-           percent(row.error_rel_length) + " of L, " + number(row.ms_per_sim_s) + " ms a second</title>";
+    svg += (has_links ? "<a href=\"#row" + std::to_string(k) + "\">" : std::string("<g>")) + "<title>" +
+           escaped(name_of(row)) + ": " + percent(row.error_rel_length) + " of L, " + number(row.ms_per_sim_s) +
+           " ms a second</title>";
     if (static_cast<int>(k) == curve.recommended)
       svg += "<circle " + at + " r=\"10\" fill=\"none\" stroke=\"#000\" stroke-width=\"2\"/>";
     const bool is_box = row.element == "hex" || row.element == "quad";
     svg += "<circle " + at + " r=\"" + (front[k] ? "5" : "4") + "\" stroke=\"" + colour_of(row.method) +
            "\" stroke-width=\"1.5\" fill=\"" + (is_box ? "#fff" : colour_of(row.method)) + "\" fill-opacity=\"" +
-           (front[k] ? "1" : "0.5") + "\"/></a>\n";
+           (front[k] ? "1" : "0.5") + "\"/>" + (has_links ? "</a>\n" : "</g>\n");
   }
   for (std::size_t m = 0; m < methods.size(); ++m) {
     svg += "<text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" + number(kTop + 14 + 16 * static_cast<double>(m)) +
@@ -195,6 +199,10 @@ std::string accuracy_svg(const AccuracyCurve& curve) {
   }
   return svg + "</svg>\n";
 }
+
+}  // namespace
+
+std::string accuracy_svg(const AccuracyCurve& curve) { return diagram(curve, false); }
 
 std::string accuracy_page(const AccuracyCurve& curve) {
   std::string html =
@@ -209,7 +217,7 @@ std::string accuracy_page(const AccuracyCurve& curve) {
       " of L can be told by it. A click on a point leads to its row; empty points are of hexahedra or quads. Choices go by "
       "counted work, which "
       "is the same on every machine; the picture shows this machine's processor time.</p>\n";
-  return html + accuracy_svg(curve) + table(curve, retarget::pareto_front(curve.rows)) + "</html>\n";
+  return html + diagram(curve, true) + table(curve, retarget::pareto_front(curve.rows)) + "</html>\n";
 }
 
 std::string accuracy_json(const AccuracyCurve& curve) {

@@ -20,7 +20,7 @@ struct AccuracyCurve {
 /// A table with a header, one line a row: method, element, nodes, dt_s, iterations, harmonics, error_rms_m,
 /// error_rel_length, ms_per_sim_s, volume_error, momentum_error, angular_error, stable.
 std::string accuracy_csv(const AccuracyCurve& curve);
-/// The curve alone, with axes, units and a sentence that says what to see. Points are links to `#row<n>`.
+/// The curve alone, with axes, units and a sentence that says what to see.
 std::string accuracy_svg(const AccuracyCurve& curve);
 /// One page that needs nothing else: the curve, whose points lead to their rows of the table.
 std::string accuracy_page(const AccuracyCurve& curve);

@@ -18,6 +18,9 @@ constexpr double kImplicitStep = 1.0 / 960;  // [s] of the implicit method as a 
 constexpr double kAgreement = 2;             // of what two methods leave open [-]: a larger distance is a disagreement
 constexpr int kMostPasses = 4000;            // of the explicit method in a frame: what wants more is not tried
 constexpr int kLeastFrames = 2;
+// What an estimate may cost beside a run that asked for no bound.
+constexpr double kEstimatedSeconds = 1;  // of the motion, at most
+constexpr int kEstimatedWindows = 4;
 
 /// The scenario as it is at another time than 0.
 template <int Dim>
@@ -340,11 +343,10 @@ template <int Dim>
 double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
   AccuracyOptions accuracy;
   accuracy.frame_s = options.dt_s * std::max(1.0, std::round(accuracy.frame_s / options.dt_s));
-  accuracy.duration_s = options.duration_s;
+  accuracy.duration_s = std::min(options.duration_s, kEstimatedSeconds);
+  accuracy.windows = kEstimatedWindows;
   const StepSetting setting{options.method, options.dt_s};
-  std::vector<WindowOf<Dim>> windows = windows_along(scenario, accuracy, setting);
-  if (windows.size() == 1)
-    windows.front().duration_s = std::min(windows.front().duration_s, accuracy.frame_s * std::ceil(1 / accuracy.frame_s));
+  const std::vector<WindowOf<Dim>> windows = windows_along(scenario, accuracy, setting);
   const bool is_accurate = options.method == physics::Method::kExplicit || options.method == physics::Method::kImplicit;
   const double substep = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
   StepSetting finer{options.method, options.dt_s / (2 * std::max(1.0, std::round(options.dt_s / substep)))};

@@ -16,6 +16,45 @@ namespace {
 const std::map<std::string, double> kGrades{{"draft", 0.05}, {"standard", 0.01}, {"final", 0.001}};
 
 constexpr double kOverFloor = 3;  // of the reference's own error [-]: what a grade asks for at least
+constexpr double kFinestSeconds = kControlSeconds / 8;  // of the closed loop that choices are held against
+
+/// Share of the work of the most accurate row that a choice saves; -1: nothing was chosen.
+double work_saved(const std::vector<retarget::AccuracyRow>& rows, int choice) {
+  const int finest = retarget::most_accurate(rows);
+  if (choice < 0 || finest < 0) return 0;
+  return 1 - rows[static_cast<std::size_t>(choice)].work_ms / rows[static_cast<std::size_t>(finest)].work_ms;
+}
+
+/// The rows within an error, least work first.
+std::vector<int> by_work(const std::vector<retarget::AccuracyRow>& rows, double most_m) {
+  std::vector<int> order;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (rows[k].stable && rows[k].error_rms_m <= most_m) order.push_back(static_cast<int>(k));
+  }
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return rows[static_cast<std::size_t>(a)].work_ms < rows[static_cast<std::size_t>(b)].work_ms;
+  });
+  return order;
+}
+
+retarget::Replay closed_loop(const retarget::Performer& performer, const retarget::SignalSet& signals,
+                             const retarget::StepSetting& setting) {
+  retarget::ReplayOptions options;
+  take_steps(options, setting);
+  return retarget::perform_briefly(performer, signals, options);
+}
+
+bool is_up(const retarget::Replay& replay) {
+  return !replay.report.fell && replay.termination == physics::Termination::kDone;
+}
+
+/// [m] of the skin; without end where it falls and the finest does not.
+double closed_loop_error(const retarget::Replay& finest, const retarget::Performer& performer,
+                         const retarget::SignalSet& signals, const retarget::StepSetting& setting) {
+  const retarget::Replay replay = closed_loop(performer, signals, setting);
+  if (is_up(finest) && !is_up(replay)) return HUGE_VAL;
+  return retarget::skin_distance(performer, finest.motion, replay.motion);
+}
 
 }  // namespace
 
@@ -48,16 +87,41 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
       choice.is_met ? retarget::cheapest_within(choice.tried, most * length - reference.uncertainty_m()) : -1;
   chosen.curve.max_error = most;
   chosen.curve.floor = floor;
-  const int finest = retarget::most_accurate(choice.tried);
-  if (finest >= 0)
-    chosen.report.work_saved = 1 - choice.row.work_ms / choice.tried[static_cast<std::size_t>(finest)].work_ms;
+  chosen.report.work_saved = work_saved(choice.tried, chosen.curve.recommended);
   return chosen;
 }
+
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::Performer& performer,
                        const retarget::SignalSet& signals, std::optional<physics::Method> only) {
   retarget::AccuracyOptions options;
   options.step_frame_s = kControlSeconds;
-  return choose_step(asked, command, retarget::performed_reference(performer, signals, options), only);
+  const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options);
+  ChosenStep chosen = choose_step(asked, command, reference, only);
+  if (!chosen.report.is_met()) return chosen;
+  const retarget::StepSetting finest{reference.setting.method, kFinestSeconds};
+  chosen.finest = closed_loop(performer, signals, finest);
+  const double most_m = chosen.report.max_error_length * performer.length - reference.uncertainty_m();
+  chosen.curve.recommended = -1;
+  double error_m = 0;
+  for (const int k : by_work(chosen.curve.rows, most_m)) {
+    const retarget::AccuracyRow& row = chosen.curve.rows[static_cast<std::size_t>(k)];
+    const retarget::StepSetting setting{*physics::method_named(row.method), row.dt_s};
+    const double found_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, signals, setting));
+    if (found_m > most_m) continue;
+    chosen.curve.recommended = k;
+    chosen.setting = setting;
+    error_m = found_m;
+    break;
+  }
+  if (chosen.curve.recommended < 0) {  // nothing cheaper will do
+    chosen.setting = finest;
+    chosen.curve.rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
+    chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
+    error_m = chosen.curve.rows.back().error_rms_m;
+  }
+  chosen.report.estimated_error_length = (error_m + reference.uncertainty_m()) / performer.length;
+  chosen.report.work_saved = work_saved(chosen.curve.rows, chosen.curve.recommended);
+  return chosen;
 }
 
 template ChosenStep choose_step<2>(const AskedAccuracy&, const std::string&, const retarget::ReferenceOf<2>&,
@@ -75,7 +139,7 @@ void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, ret
   constexpr int kLeast = 4;
   const int all = signals.activation.harmonics();
   for (retarget::AccuracyRow& row : chosen.curve.rows) row.harmonics = all;
-  if (!chosen.report.is_met() || chosen.curve.recommended < 0) return;
+  if (!chosen.report.is_met() || !chosen.finest) return;
   retarget::AccuracyOptions options;
   options.step_frame_s = kControlSeconds;
   const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options, false);
@@ -89,13 +153,15 @@ void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, ret
     row.harmonics = harmonics;
     chosen.curve.rows.push_back(row);
     if (!row.stable || row.error_rms_m > room) break;
+    const retarget::SignalSet fewer = retarget::with_harmonics(signals, harmonics);
+    const double error_m =
+        std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, fewer, chosen.setting));
+    if (error_m > room) break;
     kept = harmonics;
     chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
-    chosen.report.estimated_error_length = row.error_rel_length + chosen.curve.floor;
+    chosen.report.estimated_error_length = error_m / performer.length + chosen.curve.floor;
   }
-  if (kept == all) return;
-  signals.activation = signal::truncated(signals.activation, kept, retarget::SignalOptions().roll_off);
-  signals.force = signal::truncated(signals.force, kept, retarget::SignalOptions().roll_off);
+  if (kept < all) signals = retarget::with_harmonics(signals, kept);
 }
 
 retarget::AccuracyReport told(const ChosenStep& chosen) {

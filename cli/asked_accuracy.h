@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "io/accuracy_page.h"
@@ -23,6 +24,7 @@ struct ChosenStep {
   retarget::StepSetting setting;
   retarget::AccuracyReport report;
   io::AccuracyCurve curve;  // of what was tried, the chosen one marked
+  std::optional<retarget::Replay> finest;  // of a creature: its closed loop in steps that are finer than any choice
 };
 /// A creature's steps are whole parts of it.
 constexpr double kControlSeconds = 1.0 / 120;
@@ -32,7 +34,8 @@ template <int Dim>
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::ReferenceOf<Dim>& reference,
                        std::optional<physics::Method> only);
 
-/// Of a creature's open loop, in short windows that start from its target.
+/// Of a creature: what keeps its open loop near in short windows that start from its target, and then its closed loop, which
+/// has to stay up where the finest does.
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::Performer& performer,
                        const retarget::SignalSet& signals, std::optional<physics::Method> only);
 
@@ -44,8 +47,8 @@ retarget::AccuracyReport told(const ChosenStep& chosen);
 /// accuracy.csv and accuracy.svg of what was tried.
 void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve);
 
-/// Cuts a creature's signals to as few harmonics as leave the open loop within the error that was asked for; the rows that
-/// were tried join the curve.
+/// Cuts a creature's signals to as few harmonics as leave both loops within the error that was asked for; the rows that were
+/// tried join the curve.
 void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, retarget::SignalSet& signals);
 
 /// The line that tells of an error above what was asked for.

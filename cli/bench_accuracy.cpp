@@ -202,9 +202,10 @@ std::string summary(const io::AccuracyCurve& curve) {
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
     const retarget::AccuracyRow& row = curve.rows[k];
     if (!front[k] && static_cast<int>(k) != curve.recommended) continue;
-    std::snprintf(text, sizeof text, "%s %-8s %5d nodes %-8s step %9.6f s: error %8.4f %% L, %8.2f ms a second\n",
+    const std::string harmonics = row.harmonics > 0 ? " " + std::to_string(row.harmonics) + " harmonics" : "";
+    std::snprintf(text, sizeof text, "%s %-8s %5d nodes %-8s step %9.6f s%s: error %8.4f %% L, %8.2f ms a second\n",
                   static_cast<int>(k) == curve.recommended ? "->" : "  ", row.method.c_str(), row.nodes, row.element.c_str(),
-                  row.dt_s, 100 * row.error_rel_length, row.ms_per_sim_s);
+                  row.dt_s, harmonics.c_str(), 100 * row.error_rel_length, row.ms_per_sim_s);
     all += text;
   }
   return all;

@@ -220,7 +220,7 @@ ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyO
   reference.setting = is_stiff ? by_implicit : by_explicit;
   const auto run = [&](const StepSetting& setting) {
     Repeated<Dim> made = repeat(scenario, reference.windows, setting, options.frame_s, reference.skin, false);
-    reference.work_ms += counted_ms(scenario.scene, made.work);
+    reference.work_ms += counted_ms(scenario.scene, setting.method, made.work);
     return made;
   };
   const auto twice = [&](const StepSetting& setting) {
@@ -253,7 +253,7 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   row.error_rms_m = distance<Dim>(reference.places, repeated.places);
   row.error_rel_length = row.error_rms_m / reference.scenario.length;
   if (repeated.seconds > 0) row.ms_per_sim_s = 1000 * repeated.busy_s / repeated.seconds;
-  if (repeated.seconds > 0) row.work_ms = counted_ms(scenario.scene, repeated.work) / repeated.seconds;
+  if (repeated.seconds > 0) row.work_ms = counted_ms(scenario.scene, setting.method, repeated.work) / repeated.seconds;
   row.volume_error = repeated.worst.volume_error_max;
   row.momentum_error = repeated.worst.momentum_residual_mg;
   row.angular_error = repeated.worst.angular_residual_mgl;

@@ -40,13 +40,14 @@ Simulation best_of(const ScenarioOf<Dim>& scenario, SimulationOptions options) {
 template <int Dim>
 std::vector<EffectRow> measure_effects(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
   const Simulation none = best_of(with_only(scenario, ""), options);
-  std::vector<EffectRow> rows{{"none", none.report.ms_per_sim_s, 0, !none.report.diverged}};
+  std::vector<EffectRow> rows{{"none", none.report.ms_per_sim_s, 0, !none.report.diverged, none.report.guard_steps}};
   const auto add = [&](const std::string& name, const ScenarioOf<Dim>& with) {
     const Simulation run = best_of(with, options);
     const Eigen::Index frames = std::min(run.motion.count(), none.motion.count());
     const double count = static_cast<double>(frames) * scenario.scene.body.node_count();
     const double squared = (run.motion.frames.leftCols(frames) - none.motion.frames.leftCols(frames)).squaredNorm();
-    rows.push_back({name, run.report.ms_per_sim_s, std::sqrt(squared / count) / scenario.length, !run.report.diverged});
+    rows.push_back({name, run.report.ms_per_sim_s, std::sqrt(squared / count) / scenario.length, !run.report.diverged,
+                    run.report.guard_steps});
   };
   for (const EffectDecision& decision : scenario.decisions) {
     const bool is_law = decision.name == "volume" && scenario.scene.body.volume_stiffness.size() == 0;

@@ -13,6 +13,7 @@ struct EffectRow {
   double ms_per_sim_s = 0;       // as the clock of this thread has it
   double difference_length = 0;  // of the motion to that without any [per L, RMS over nodes and frames]
   bool stable = true;
+  int guard_steps = 0;  // in which 'euler' took over, which is dear
 };
 
 /// Lets the scene go without effects, with each that it has alone, and with all of them.

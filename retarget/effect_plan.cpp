@@ -13,9 +13,9 @@ constexpr double kExtent = 2;  // of L [-]: no part of a body that nothing holds
 constexpr double kLeastResistance = 0.005;  // of the weight [-]: less is not seen
 constexpr double kGravity = 9.81;           // [m/s2] of the weight where there is none
 
-std::string number(double value) {
+std::string number(double value, int digits = 2) {
   char text[40];
-  std::snprintf(text, sizeof text, "%.2g", value);
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
   return text;
 }
 
@@ -34,7 +34,7 @@ class Planner {
 
   std::string plan() {
     const bool has_gravity = scene_.gravity.norm() > 0;
-    decide("gravity", has_gravity, has_gravity, number(scene_.gravity.norm()) + " m/s2", "the scene has none");
+    decide("gravity", has_gravity, has_gravity, number(scene_.gravity.norm(), 3) + " m/s2", "the scene has none");
     if (!is_on("gravity")) scene_.gravity.setZero();
     decide_surroundings();
     decide_fluids();

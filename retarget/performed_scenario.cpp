@@ -6,6 +6,13 @@
 
 namespace hydrostat::retarget {
 
+SignalSet with_harmonics(const SignalSet& signals, int harmonics) {
+  SignalSet fewer = signals;
+  fewer.activation = signal::truncated(fewer.activation, harmonics, SignalOptions().roll_off);
+  fewer.force = signal::truncated(fewer.force, harmonics, SignalOptions().roll_off);
+  return fewer;
+}
+
 ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& signals, int harmonics) {
   ScenarioOf<3> scenario;
   scenario.scene = performer.scene;
@@ -13,11 +20,9 @@ ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& si
   scenario.size = performer.size;
   scenario.self_contact_reason = performer.self_contact_reason;
   MotionCurve(performer.prepared.target).at(0, scenario.start.x, scenario.start.v);
-  SignalSet kept = signals;
-  if (harmonics > 0 && harmonics < kept.activation.harmonics()) {
-    kept.activation = signal::truncated(kept.activation, harmonics, SignalOptions().roll_off);
-  }
-  const auto player = std::make_shared<signal::Synthesiser>(activations(kept));
+  const bool is_cut = harmonics > 0 && harmonics < signals.activation.harmonics();
+  const auto player =
+      std::make_shared<signal::Synthesiser>(activations(is_cut ? with_harmonics(signals, harmonics) : signals));
   scenario.drive = [player](double time_s, Eigen::VectorXd& activation) { player->at(time_s, activation); };
   return scenario;
 }
@@ -37,6 +42,22 @@ ReferenceOf<3> performed_reference(const Performer& performer, const SignalSet& 
   }
   const physics::ContactPointsOf<3> skin{performer.embedding.nodes, performer.embedding.weights};
   return make_reference<3>(scenario, options, std::move(windows), skin, is_checked);
+}
+
+Replay perform_briefly(const Performer& performer, const SignalSet& signals, const ReplayOptions& options) {
+  const Motion& target = performer.prepared.target;
+  PerformOptions perform_options;
+  perform_options.replay = options;
+  perform_options.replay.duration_s = std::min(usual_duration(target), std::clamp(2 * target.duration_s(), 2.0, 4.0));
+  perform_options.baselines = false;
+  return *perform(performer, signals, perform_options).closed_loop;
+}
+
+double skin_distance(const Performer& performer, const Motion& a, const Motion& b) {
+  const Eigen::Index frames = std::min(a.count(), b.count());
+  double sum = 0;
+  for (Eigen::Index f = 0; f < frames; ++f) sum += embedded_positions(performer.embedding, a.at(f) - b.at(f)).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(frames * performer.embedding.count()));
 }
 
 }  // namespace hydrostat::retarget

@@ -52,7 +52,9 @@ TEST_F(AccuracyCommands, BenchWritesTheCurve) {
   const auto& best = json["rows"][static_cast<std::size_t>(chosen)];
   EXPECT_LE(best["error_rel_length"], json["max_error"]);
   for (const auto& row : json["rows"]) {
-    if (row["stable"] && row["error_rel_length"] <= json["max_error"]) EXPECT_GE(row["work_ms"], best["work_ms"]);
+    if (row["stable"] && row["error_rel_length"] <= json["max_error"]) {
+      EXPECT_GE(row["work_ms"], best["work_ms"]);
+    }
   }
 }
 
@@ -65,6 +67,7 @@ TEST_F(AccuracyCommands, SimulateTakesTheCheapestWithinTheErrorAndTellsIt) {
   EXPECT_EQ(fine["max_error_length"], 0.005);
   EXPECT_GE(draft["work_saved"], fine["work_saved"]);
   EXPECT_TRUE(fs::exists(directory.path / "fine" / "accuracy.svg"));
+  EXPECT_NE(io::read_file(directory.path / "fine" / "report.html").find("What accuracy costs: "), std::string::npos);
   ASSERT_EQ(run("simulate scene.toml -o again --max-error 0.5% --quiet").exit_code, 0);
   EXPECT_EQ(report("again")["accuracy"]["method"], fine["method"]);
   EXPECT_EQ(report("again")["accuracy"]["dt_s"], fine["dt_s"]);
@@ -92,7 +95,9 @@ TEST_F(AccuracyCommands, ExplainTellsEveryEffectOnceWithItsReason) {
   EXPECT_EQ(effects.size(), 13U);
   for (const auto& effect : effects) {
     EXPECT_NE(effect["reason"], "");
-    if (effect["state"] == "off") EXPECT_EQ(effect["ms_per_sim_s"], 0) << effect["name"];
+    if (effect["state"] == "off") {
+      EXPECT_EQ(effect["ms_per_sim_s"], 0) << effect["name"];
+    }
   }
   EXPECT_EQ(run("bench effects scene.toml -o bench --duration 0.1").exit_code, 0);
   EXPECT_TRUE(fs::exists(directory.path / "bench" / "effects.html"));

@@ -15,7 +15,7 @@ namespace {
 // Three points of the curve: what an eye forgives, what it does not see, what a measurement wants [per L].
 const std::map<std::string, double> kGrades{{"draft", 0.05}, {"standard", 0.01}, {"final", 0.001}};
 
-constexpr double kOverFloor = 3;  // of the reference's own error [-]: what a grade asks for at least
+constexpr double kOverFloor = 3;                        // of the reference's own error [-]: what a grade asks for at least
 constexpr double kFinestSeconds = kControlSeconds / 8;  // of the closed loop that choices are held against
 
 /// Share of the work of the most accurate row that a choice saves; -1: nothing was chosen.
@@ -101,26 +101,26 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   const retarget::StepSetting finest{reference.setting.method, kFinestSeconds};
   chosen.finest = closed_loop(performer, signals, finest);
   const double most_m = chosen.report.max_error_length * performer.length - reference.uncertainty_m();
-  chosen.curve.recommended = -1;
-  double error_m = 0;
-  for (const int k : by_work(chosen.curve.rows, most_m)) {
-    const retarget::AccuracyRow& row = chosen.curve.rows[static_cast<std::size_t>(k)];
+  std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
+  rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
+  const int last = static_cast<int>(rows.size()) - 1;
+  chosen.setting = finest;  // where nothing cheaper will do
+  chosen.curve.recommended = last;
+  double error_m = rows.back().error_rms_m;
+  for (const int k : by_work(rows, most_m)) {
+    if (k == last) break;
+    const retarget::AccuracyRow& row = rows[static_cast<std::size_t>(k)];
     const retarget::StepSetting setting{*physics::method_named(row.method), row.dt_s};
     const double found_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, signals, setting));
     if (found_m > most_m) continue;
-    chosen.curve.recommended = k;
     chosen.setting = setting;
+    chosen.curve.recommended = k;
     error_m = found_m;
     break;
   }
-  if (chosen.curve.recommended < 0) {  // nothing cheaper will do
-    chosen.setting = finest;
-    chosen.curve.rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
-    chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
-    error_m = chosen.curve.rows.back().error_rms_m;
-  }
   chosen.report.estimated_error_length = (error_m + reference.uncertainty_m()) / performer.length;
-  chosen.report.work_saved = work_saved(chosen.curve.rows, chosen.curve.recommended);
+  chosen.report.work_saved = 1 - rows[static_cast<std::size_t>(chosen.curve.recommended)].work_ms / rows.back().work_ms;
+  chosen.reference = reference;
   return chosen;
 }
 
@@ -140,22 +140,18 @@ void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, ret
   const int all = signals.activation.harmonics();
   for (retarget::AccuracyRow& row : chosen.curve.rows) row.harmonics = all;
   if (!chosen.report.is_met() || !chosen.finest) return;
-  retarget::AccuracyOptions options;
-  options.step_frame_s = kControlSeconds;
-  const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options, false);
   const double room = (chosen.report.max_error_length - chosen.curve.floor) * performer.length;
   int kept = all;
   for (const double part : {0.75, 0.5, 0.25}) {
     const int harmonics = std::max(kLeast, static_cast<int>(std::lround(part * all)));
     if (harmonics >= kept) break;
-    retarget::AccuracyRow row =
-        retarget::measure_error(reference, retarget::performed_scenario(performer, signals, harmonics), chosen.setting);
+    retarget::AccuracyRow row = retarget::measure_error(
+        *chosen.reference, retarget::performed_scenario(performer, signals, harmonics), chosen.setting);
     row.harmonics = harmonics;
     chosen.curve.rows.push_back(row);
     if (!row.stable || row.error_rms_m > room) break;
     const retarget::SignalSet fewer = retarget::with_harmonics(signals, harmonics);
-    const double error_m =
-        std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, fewer, chosen.setting));
+    const double error_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, fewer, chosen.setting));
     if (error_m > room) break;
     kept = harmonics;
     chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;

@@ -23,8 +23,9 @@ struct AskedAccuracy {
 struct ChosenStep {
   retarget::StepSetting setting;
   retarget::AccuracyReport report;
-  io::AccuracyCurve curve;  // of what was tried, the chosen one marked
-  std::optional<retarget::Replay> finest;  // of a creature: its closed loop in steps that are finer than any choice
+  io::AccuracyCurve curve;                            // of what was tried, the chosen one marked
+  std::optional<retarget::ReferenceOf<3>> reference;  // of a creature
+  std::optional<retarget::Replay> finest;             // likewise: its closed loop in steps finer than any choice
 };
 /// A creature's steps are whole parts of it.
 constexpr double kControlSeconds = 1.0 / 120;

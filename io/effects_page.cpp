@@ -63,7 +63,8 @@ std::string effects_svg(const std::string& subject, const std::vector<EffectRow>
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double y = kTop + kLine * static_cast<double>(k);
     svg += "<text x=\"" + number(kLabel - 6) + "\" y=\"" + number(y + 11) + "\" text-anchor=\"end\">" + rows[k].effect +
-           "</text>" + bar(kLabel, y, rows[k].ms_per_sim_s / most_ms, "#1f6fb4", number(rows[k].ms_per_sim_s) + guarded(rows[k])) +
+           "</text>" +
+           bar(kLabel, y, rows[k].ms_per_sim_s / most_ms, "#1f6fb4", number(rows[k].ms_per_sim_s) + guarded(rows[k])) +
            bar(kLabel + kBar + 70, y, rows[k].difference_length / most_difference, "#d2691e",
                number(100 * rows[k].difference_length)) +
            "\n";

@@ -319,7 +319,8 @@ StepChoice choose_setting(const ReferenceOf<Dim>& reference, double most_m, std:
   StepChoice choice;
   std::vector<StepSetting> settings;
   const double room = most_m - reference.uncertainty_m();
-  for (const std::vector<StepSetting>& of_method : settings_to_try(reference.scenario.scene, reference.options.step_frame_s)) {
+  for (const std::vector<StepSetting>& of_method :
+       settings_to_try(reference.scenario.scene, reference.options.step_frame_s)) {
     if (only && of_method.front().method != *only) continue;
     for (const StepSetting& setting :
          of_method) {  // shorter steps cost more: the first that will do is the method's cheapest

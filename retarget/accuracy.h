@@ -22,12 +22,12 @@ struct WindowOf {
 };
 
 struct AccuracyOptions {
-  double duration_s = 1;      // of the motion that is looked at, at most
+  double duration_s = 1;           // of the motion that is looked at, at most
   double step_frame_s = 1.0 / 30;  // which steps that are tried fill; fills frame_s
-  double frame_s = 1.0 / 30;  // between the places that are compared: a whole number of every setting's steps
-  double window_s = 0.1;      // with contact, whose paths part in any method
-  int windows = 8;            // likewise, evenly over the motion
-  int fineness = 4;           // the reference's substeps in one of explicit's own
+  double frame_s = 1.0 / 30;       // between the places that are compared: a whole number of every setting's steps
+  double window_s = 0.1;           // with contact, whose paths part in any method
+  int windows = 8;                 // likewise, evenly over the motion
+  int fineness = 4;                // the reference's substeps in one of explicit's own
 };
 
 /// What is to be repeated, as it truly goes: by an accurate method in short steps.

@@ -17,8 +17,8 @@ ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& si
 ReferenceOf<3> performed_reference(const Performer& performer, const SignalSet& signals, const AccuracyOptions& options,
                                    bool is_checked = true);
 
-/// The closed loop from the start of the target, for two periods, 2 to 4 s. Small errors of a window may add up to a fall: here
-/// they show.
+/// The closed loop from the start of the target, for two periods, 2 to 4 s. Small errors of a window may add up to a fall:
+/// here they show.
 Replay perform_briefly(const Performer& performer, const SignalSet& signals, const ReplayOptions& options);
 
 /// Between two replays of a creature [m, RMS over the skin's vertices and the frames that both have].

@@ -6,6 +6,8 @@
 #include <memory>
 #include <thread>
 
+#include "cli/asked_accuracy.h"
+#include "cli/command_line.h"
 #include "cli/import_options.h"
 #include "cli/number_option.h"
 #include "cli/outcome.h"
@@ -42,6 +44,7 @@ struct ConvertOptions {
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   bool calibrated = false, json = false, quiet = false;
   io::ImportOptions import;
+  AskedAccuracy accuracy;
 };
 
 constexpr double kLeastLimit = 0.01, kMostLimit = 0.9;
@@ -90,10 +93,17 @@ std::string key_of(const io::ImportedCharacter& imported) {
   return key_after(io::file_sha256("/proc/self/exe"), io::packed(io::record_of(imported), "import", ""));
 }
 
+/// Wished where --nodes is not told: most of a conversion's time goes with them. 0: what fits the body.
+int nodes_for(const std::string& grade) {
+  constexpr int kDraft = 60, kFinal = 400;
+  if (grade == "draft") return kDraft;
+  return grade == "final" ? kFinal : 0;
+}
+
 retarget::CreatureOptions creature_options(const ConvertOptions& options) {
   retarget::CreatureOptions result;
   result.height_m = options.height;
-  result.nodes = options.nodes;
+  result.nodes = options.nodes > 0 ? options.nodes : nodes_for(options.accuracy.grade);
   result.root_motion = kRootMotions.at(options.root_motion);
   result.friction = options.friction;
   result.method = kMethods.at(options.method);
@@ -195,7 +205,8 @@ retarget::BodyReport body_report(const retarget::Creature& creature) {
   return report;
 }
 
-io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report) {
+io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
+                                   const std::optional<ChosenStep>& chosen) {
   io::CreatureRecord record;
   record.source_file = fs::absolute(options.clip_file).string();
   record.source_sha256 = report.source.sha256;
@@ -216,6 +227,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
   if (!options.import.up.empty()) record.settings.emplace_back("up", options.import.up);
   if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
+  if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
 }
@@ -240,6 +252,7 @@ class Conversion {
     make_body(imported);
     find_activations(wished_limit);
     solve_signals();
+    if (options_.accuracy.is_asked()) choose_steps();
     let_go();
     write();
   }
@@ -254,7 +267,7 @@ class Conversion {
   }
 
   void make_body(const io::ImportedCharacter& imported) {
-    key_ = key_after(key_of(imported), options_.height, options_.nodes, options_.element, name_of(settings_.material),
+    key_ = key_after(key_of(imported), options_.height, settings_.nodes, options_.element, name_of(settings_.material),
                      std::int64_t{settings_.calibrated});
     creature_ = stages_.run("body", key_, [&] { return retarget::make_creature(imported.character, settings_); });
     creature_.scene.ground.friction = options_.friction;  // of the ground, not of the body: what is cached may have another
@@ -315,14 +328,31 @@ class Conversion {
     signals_text_ = io::signals_text(signals_);
   }
 
+  /// The cheapest method and step that keep the error asked for, then as few harmonics as leave it so.
+  void choose_steps() {
+    stages_.run("accuracy", [&] {
+      const std::optional<physics::Method> only = options_.method == "auto" ? std::nullopt : std::optional(settings_.method);
+      chosen_ = choose_step(options_.accuracy, "hydrostat convert", target_.performer, signals_, only);
+      cut_harmonics(*chosen_, target_.performer, signals_);
+      target_.report.signals = signals_report(signals_);
+      target_.report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
+      signals_text_ = io::signals_text(signals_);
+      target_file_ = io::target_bytes(target_);
+      return 0;
+    });
+  }
+
   void let_go() {
     retarget::PerformOptions perform_options;
     perform_options.replay.method = settings_.method;
+    if (chosen_) take_steps(perform_options.replay, chosen_->setting);
     perform_options.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
     perform_options.seed = options_.seed;
     perform_options.threads = options_.threads;
-    key_ = key_after(key_, signals_text_, physics::name_of(settings_.method), std::int64_t{options_.seed});
+    key_ = key_after(key_, signals_text_, physics::name_of(perform_options.replay.method), std::int64_t{options_.seed});
+    if (chosen_) key_ = key_after(key_, perform_options.replay.step_s);
     performances_ = stages_.run("replay", key_, [&] { return retarget::perform(target_.performer, signals_, perform_options); });
+    if (chosen_) target_.report.accuracy = told(*chosen_);
     report_replays(performances_, target_.report);
     stages_.run("measurement", [&] {
       measure(target_.performer, signals_, perform_options, target_.report);
@@ -333,7 +363,7 @@ class Conversion {
   void write() {
     const retarget::Performer& performer = target_.performer;
     stages_.run("files", [&] {
-      writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report)));
+      writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_)));
       writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                                dominant_bones_of_nodes(creature_.mesh.bone_weights)));
       writer_.write("target.bin", target_file_);
@@ -344,7 +374,7 @@ class Conversion {
       return 0;
     });
     target_.report.timing_s = stages_.timing_s;
-    write_outcome(writer_, performer, signals_, performances_, target_.report);
+    write_outcome(writer_, performer, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
   }
 
   const ConvertOptions& options_;
@@ -357,6 +387,7 @@ class Conversion {
   retarget::InverseDynamics inverse_;
   io::PerformedTarget target_;
   retarget::SignalSet signals_;
+  std::optional<ChosenStep> chosen_;
   retarget::Performances performances_;
   std::string target_file_, signals_text_;
 };
@@ -378,7 +409,12 @@ int convert(const ConvertOptions& options) {
   writer.commit();
   const retarget::Replay& run = conversion.performances().main();
   const std::string motion_file = (fs::path(options.out) / "failed.glb").string();
-  return options.json ? tell_report(run, options.out, motion_file, conversion.report()) : tell_run(run, options.out, motion_file);
+  const int exit_code =
+      options.json ? tell_report(run, options.out, motion_file, conversion.report()) : tell_run(run, options.out, motion_file);
+  const retarget::AccuracyReport& accuracy = conversion.report().accuracy;
+  if (exit_code != kDone || accuracy.is_met()) return exit_code;
+  std::cerr << too_inaccurate(options.clip_file, accuracy) << std::endl;
+  return kShortOfTarget;
 }
 
 }  // namespace
@@ -412,6 +448,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   convert_command->add_option("--method", options->method, "Time integration: auto, explicit or euler")
       ->check(CLI::IsMember(kMethods))
       ->capture_default_str();
+  add_accuracy_options(*convert_command, options->accuracy);
   convert_command->add_option("--friction", options->friction, "Coulomb's coefficient of the ground")
       ->check(number_within(0.05, 5))
       ->capture_default_str();

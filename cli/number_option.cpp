@@ -37,4 +37,10 @@ double parse_number(const std::string& text, double least, double most, const st
   return *value;
 }
 
+double parse_share(const std::string& text, const std::string& command, const std::string& option) {
+  constexpr double kLeast = 1e-7, kMost = 0.5;
+  if (!text.ends_with('%')) return parse_number(text, kLeast, kMost, command, option);
+  return parse_number(text.substr(0, text.size() - 1), 100 * kLeast, 100 * kMost, command, option) / 100;
+}
+
 }  // namespace hydrostat::cli

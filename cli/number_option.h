@@ -11,4 +11,7 @@ CLI::Validator number_within(double least, double most);
 /// A number that must be finite and within [least, most]. `command` and `option` are what the UsageError names otherwise.
 double parse_number(const std::string& text, double least, double most, const std::string& command, const std::string& option);
 
+/// A share above 0 and at most a half, as "1%" or "0.01". What is none is a UsageError.
+double parse_share(const std::string& text, const std::string& command, const std::string& option);
+
 }  // namespace hydrostat::cli

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <iostream>
 
+#include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
 #include "io/gltf_out.h"
 #include "io/performance_page.h"
@@ -20,19 +21,22 @@ void report_replays(const retarget::Performances& performances, retarget::RunRep
   if (performances.naive) report.naive = performances.naive->report;
   if (performances.open_loop) report.open_loop = performances.open_loop->report;
   if (performances.closed_loop) report.closed_loop = performances.closed_loop->report;
-  report.outcome_ok = !is_down(performances.main());
+  report.outcome_ok = !is_down(performances.main()) && report.accuracy.is_met();
 }
 
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
-                   const retarget::Performances& performances, const retarget::RunReport& report) {
+                   const retarget::Performances& performances, const retarget::RunReport& report,
+                   const io::AccuracyCurve* curve) {
   const retarget::Replay& run = performances.main();
-  const bool down = is_down(run);
+  const bool down = !report.outcome_ok;
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
                         {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
                         performer.scene.body.mass, run.motion, {});
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));
-  io::write_performance_page(writer.directory() / "report.html", performer, signals, performances, report);
+  io::write_performance_page(writer.directory() / "report.html", performer, signals, performances, report,
+                             curve == nullptr ? "" : io::accuracy_svg(*curve));
+  if (curve != nullptr) write_curve(writer, *curve);
 }
 
 retarget::SignalsReport signals_report(const retarget::SignalSet& signals) {
@@ -53,7 +57,8 @@ void measure(const retarget::Performer& performer, const retarget::SignalSet& si
   report.accuracy.material =
       name_of(elements.empty() ? retarget::BodyMaterial::kSprings : retarget::material_of(elements.front().block.law));
   report.accuracy.dt_s = physics::make_stepper(options.replay.method, performer.scene)->substep(options.replay.step_s);
-  report.accuracy.estimated_error_length = retarget::substep_error(performer, signals, options.replay);
+  if (report.accuracy.max_error_length == 0)  // otherwise it is known from the choice
+    report.accuracy.estimated_error_length = retarget::substep_error(performer, signals, options.replay);
   if (options.seed == 0) return;
   const retarget::Variation variation = retarget::variation_of(options.seed);
   char text[200];

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "io/accuracy_page.h"
 #include "io/creature_directory.h"
 #include "retarget/performance.h"
 
@@ -13,9 +14,11 @@ bool is_down(const retarget::Replay& replay);
 /// Puts the replays' figures into the report.
 void report_replays(const retarget::Performances& performances, retarget::RunReport& report);
 
-/// Writes replay.glb, or failed.glb where the run is down, and takes the other one away; report.json and report.html.
+/// Writes replay.glb, or failed.glb where the outcome is short of what was asked, and takes the other one away; report.json and
+/// report.html; accuracy.csv and accuracy.svg of a curve.
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
-                   const retarget::Performances& performances, const retarget::RunReport& report);
+                   const retarget::Performances& performances, const retarget::RunReport& report,
+                   const io::AccuracyCurve* curve);
 
 /// The figures of a signal set; its error against the activations is not known here.
 retarget::SignalsReport signals_report(const retarget::SignalSet& signals);

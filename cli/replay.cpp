@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
 #include "cli/outcome.h"
@@ -26,6 +27,7 @@ constexpr double kFastestPush = 100;   // [m/s] along an axis
 
 struct ReplayCommand {
   std::string directory, out, trace;
+  AskedAccuracy accuracy;
   double duration = 0, cycles = 0, trace_rate = 0;
   bool open_loop = false, json = false, quiet = false;
   std::vector<std::string> pushes;
@@ -79,6 +81,7 @@ retarget::PerformOptions perform_options(const ReplayCommand& command, const io:
   const retarget::Motion& target = creature.target.performer.prepared.target;
   retarget::PerformOptions options;
   options.replay.method = physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
+  take_steps(options.replay, {options.replay.method, io::setting(creature.record, "step_s", options.replay.step_s)});
   options.replay.duration_s = command.duration > 0  ? command.duration
                               : command.cycles > 0 ? command.cycles * target.duration_s()
                                                    : retarget::usual_duration(target);
@@ -112,34 +115,50 @@ int replay(const ReplayCommand& command) {
   const int every = steps_per_row(command, {});
   io::LoadedCreature creature = stages.run("load", [&] { return io::load_creature(command.directory); });
   const retarget::Performer& performer = creature.target.performer;
-  const retarget::PerformOptions options = perform_options(command, creature);
+  retarget::PerformOptions options = perform_options(command, creature);
+  std::optional<ChosenStep> chosen;
+  if (command.accuracy.is_asked()) {
+    chosen = stages.run("accuracy", [&] { return choose_step(command.accuracy, kCommand, performer, creature.signals, std::nullopt); });
+    take_steps(options.replay, chosen->setting);
+  }
   std::optional<io::CreatureWriter> writer;
   if (command.out.empty()) writer.emplace(command.directory, io::CreatureWriter::Start::amended);
 
   const retarget::Performances performances =
       stages.run("replay", [&] { return retarget::perform(performer, creature.signals, options); });
   if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
-  if (!writer) return write_motion(command, performer, performances);
+  const bool is_met = !chosen || chosen->report.is_met();
+  if (!writer) {
+    const int exit_code = write_motion(command, performer, performances);
+    if (is_met || exit_code != kDone) return exit_code;
+    std::cerr << too_inaccurate(command.directory, told(*chosen)) << std::endl;
+    return kShortOfTarget;
+  }
 
   retarget::RunReport& report = creature.target.report;
   const double signal_error = report.signals.error_rms_l0;
   report.signals = signals_report(creature.signals);
   report.signals.error_rms_l0 = signal_error;
   stages.run("measurement", [&] {
+    report.accuracy = chosen ? told(*chosen) : retarget::AccuracyReport();
     measure(performer, creature.signals, options, report);
     return 0;
   });
   report_replays(performances, report);
   report.timing_s = stages.timing_s;
   try {
-    write_outcome(*writer, performer, creature.signals, performances, report);
+    write_outcome(*writer, performer, creature.signals, performances, report, chosen ? &chosen->curve : nullptr);
   } catch (const Error& error) {
     throw writer->as_seen(error);
   }
   writer->commit();
   const retarget::Replay& run = performances.main();
   const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();
-  return command.json ? tell_report(run, command.directory, motion_file, report) : tell_run(run, command.directory, motion_file);
+  const int exit_code =
+      command.json ? tell_report(run, command.directory, motion_file, report) : tell_run(run, command.directory, motion_file);
+  if (is_met || exit_code != kDone) return exit_code;
+  std::cerr << too_inaccurate(command.directory, report.accuracy) << std::endl;
+  return kShortOfTarget;
 }
 
 }  // namespace
@@ -158,6 +177,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   replay_command->add_option("--push", command->pushes, "t=2,dv=0.3:0:0: a force on the whole body for 0.1 s from t [s] on that would "
                                                         "change its velocity by dv [m/s]; may be given several times")
       ->allow_extra_args(false);
+  add_accuracy_options(*replay_command, command->accuracy);
   CLI::Option* seed = replay_command->add_option("--seed", command->seed, "See 'hydrostat convert --help' [the creature's]");
   CLI::Option* trace = replay_command->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
   replay_command->add_option("--trace-rate", command->trace_rate, "Rows a second, a whole part of the 120 of the control")

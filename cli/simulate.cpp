@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -7,6 +8,7 @@
 #include <memory>
 #include <thread>
 
+#include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
 #include "cli/stages.h"
@@ -15,6 +17,7 @@
 #include "io/report.h"
 #include "io/simulation_files.h"
 #include "io/trace_writer.h"
+#include "retarget/accuracy.h"
 
 namespace hydrostat::cli {
 
@@ -23,11 +26,13 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kCommand = "hydrostat simulate";
-constexpr double kLongest = 3600;        // [s]
-constexpr double kLargestTrace = 4e9;    // [bytes]
+constexpr double kLongest = 3600;       // [s]
+constexpr double kLongestMeasured = 2;  // [s] of the motion, where --max-error is asked for
+constexpr double kLargestTrace = 4e9;   // [bytes]
 
 struct SimulateCommand {
   std::string scene, out, method, trace;
+  AskedAccuracy accuracy;
   double duration = 0, trace_rate = 0;
   unsigned seed = 0;
   bool seed_is_given = false, json = false, quiet = false;
@@ -40,7 +45,8 @@ int steps_per_row(const SimulateCommand& command, double dt_s) {
   const double every = 1 / (dt_s * command.trace_rate);
   if (every < 1 - 1e-9 || std::abs(every - std::round(every)) > 1e-6 * every) {
     char text[120];
-    std::snprintf(text, sizeof text, "%g Hz is not a whole part of the %g Hz at which the scene is stepped", command.trace_rate, 1 / dt_s);
+    std::snprintf(text, sizeof text, "%g Hz is not a whole part of the %g Hz at which the scene is stepped",
+                  command.trace_rate, 1 / dt_s);
     throw UsageError(kCommand, "option --trace-rate", text, "Give a whole part of it.");
   }
   return static_cast<int>(std::lround(every));
@@ -58,13 +64,19 @@ retarget::SimulationOptions options_of(const SimulateCommand& command, const io:
 
 /// What command line and scene file say together.
 io::SceneFile read_scene(const SimulateCommand& command) {
-  io::SceneFile scene = io::read_scene_file(command.scene, command.seed_is_given ? std::optional(command.seed) : std::nullopt);
-  if (const std::optional<physics::Method> method = io::method_named(command.method)) scene.method = *method;
+  io::SceneFile scene =
+      io::read_scene_file(command.scene, command.seed_is_given ? std::optional(command.seed) : std::nullopt);
+  if (!command.method.empty()) {
+    const std::optional<physics::Method> method = io::method_named(command.method);
+    if (method) scene.method = *method;
+    scene.method_is_auto = !method;
+  }
   if (command.duration > 0) scene.duration_s = command.duration;
   return scene;
 }
 
-void refuse_large_trace(const SimulateCommand& command, const retarget::SimulationOptions& options, Eigen::Index nodes, Eigen::Index edges) {
+void refuse_large_trace(const SimulateCommand& command, const retarget::SimulationOptions& options, Eigen::Index nodes,
+                        Eigen::Index edges) {
   if (!options.trace) return;
   const double rows = options.duration_s / (options.dt_s * options.steps_per_row);
   if (rows * 8 * static_cast<double>(15 * nodes + edges) <= kLargestTrace) return;
@@ -72,9 +84,24 @@ void refuse_large_trace(const SimulateCommand& command, const retarget::Simulati
                    command.trace_rate > 0 ? "Give a smaller --trace-rate or --duration." : "Give a --trace-rate.");
 }
 
+/// Takes the cheapest method and step that keep the error asked for, and tells of them.
+ChosenStep choose(const SimulateCommand& command, io::SceneFile& scene) {
+  retarget::AccuracyOptions options;
+  options.duration_s = std::min(kLongestMeasured, scene.duration_s);
+  return std::visit(
+      [&]<int Dim>(const retarget::ScenarioOf<Dim>& scenario) {
+        ChosenStep chosen = choose_step(command.accuracy, kCommand, retarget::make_reference(scenario, options),
+                                        scene.method_is_auto ? std::nullopt : std::optional(scene.method));
+        scene.method = chosen.setting.method;
+        scene.dt_s = chosen.setting.dt_s;
+        return chosen;
+      },
+      scene.scenario);
+}
+
 template <int Dim>
-void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& scenario, const retarget::SimulationOptions& options,
-                 retarget::RunReport& report) {
+void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& scenario,
+                 const retarget::SimulationOptions& options, retarget::RunReport& report) {
   const physics::BodyOf<Dim>& body = scenario.scene.body;
   report.source.file = scene.file;
   report.source.sha256 = scene.sha256;
@@ -109,28 +136,31 @@ io::CreatureRecord record_of(const io::SceneFile& scene, const retarget::RunRepo
                      {"dt_s", scene.dt_s},
                      {"duration_s", scene.duration_s},
                      {"seed", static_cast<std::int64_t>(scene.seed)}};
-  for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
+  for (const retarget::EffectReport& effect : report.effects)
+    record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
 }
 
 void write_files(io::CreatureWriter& writer, const io::SceneFile& scene, const retarget::Simulation& simulation,
-                 const retarget::RunReport& report) {
-  const bool diverged = simulation.report.diverged;
+                 const retarget::RunReport& report, const std::optional<ChosenStep>& chosen) {
   writer.write("creature.toml", io::to_toml(record_of(scene, report)));
   writer.write("body.json", io::scene_body_text(scene));
   writer.write("report.json", io::report_json(report));
-  io::write_simulation_glb(writer.directory() / (diverged ? "failed.glb" : "replay.glb"), scene, simulation);
-  io::write_simulation_page(writer.directory() / "report.html", scene, simulation, report);
+  io::write_simulation_glb(writer.directory() / (report.outcome_ok ? "replay.glb" : "failed.glb"), scene, simulation);
+  io::write_simulation_page(writer.directory() / "report.html", scene, simulation, report,
+                            chosen ? io::accuracy_svg(chosen->curve) : "");
+  if (chosen) write_curve(writer, chosen->curve);
 }
 
 std::string summary(const retarget::RunReport& report, const std::string& where) {
   const retarget::SimulationReport& run = *report.simulation;
   char text[300];
   std::snprintf(text, sizeof text,
-                ": %.3g s of %d nodes by '%s'; travel %.3f L, volume error %.2f %% at most, penetration %.2f %% D, %d inverted elements; "
+                ": %.3g s of %d nodes by '%s'; travel %.3f L, volume error %.2f %% at most, penetration %.2f %% D, %d "
+                "inverted elements; "
                 "%.1fx real time",
-                run.duration_s, report.body.nodes, report.accuracy.method.c_str(), run.travel_length, 100 * run.volume_error_max,
-                100 * run.penetration_max_size, run.inverted_elements, run.real_time_factor);
+                run.duration_s, report.body.nodes, report.accuracy.method.c_str(), run.travel_length,
+                100 * run.volume_error_max, 100 * run.penetration_max_size, run.inverted_elements, run.real_time_factor);
   return where + text;
 }
 
@@ -139,8 +169,13 @@ int tell(const SimulateCommand& command, const retarget::RunReport& report) {
   if (command.json) std::cout << io::report_json(report);
   if (run.diverged) {
     std::cerr << one_line({command.scene, "simulation", "it diverged: " + run.diverged_cause,
-                           (fs::path(command.out) / "failed.glb").string() + " shows it; try --method euler, a smaller dt_s or a softer body"})
+                           (fs::path(command.out) / "failed.glb").string() +
+                               " shows it; try --method euler, a smaller dt_s or a softer body"})
               << std::endl;
+    return kShortOfTarget;
+  }
+  if (!report.accuracy.is_met()) {
+    std::cerr << too_inaccurate(command.scene, report.accuracy) << std::endl;
     return kShortOfTarget;
   }
   if (!command.json) std::cout << summary(report, command.out) << "\n";
@@ -151,32 +186,39 @@ int simulate(const SimulateCommand& command) {
   Progress progress(std::cerr, progress_style(command.quiet));
   Stages stages(progress);
   io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
+  retarget::RunReport report;
+  std::optional<ChosenStep> chosen;
+  if (command.accuracy.is_asked()) {
+    chosen = stages.run("accuracy", [&] { return choose(command, scene); });
+    report.accuracy = chosen->report;
+  }
   const retarget::SimulationOptions options = options_of(command, scene);
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
-  retarget::RunReport report;
   const retarget::Simulation simulation = std::visit(
       [&](auto& scenario) {
         const auto& body = scenario.scene.body;
         refuse_large_trace(command, options, body.node_count(), body.edge_count());
         // A second thread measures the error meanwhile; without one it is done when it is asked for.
-        std::future<double> error = std::async(command.threads > 1 ? std::launch::async : std::launch::deferred,
-                                               [alone = scenario, &options] { return retarget::substep_error(alone, options); });
+        std::future<double> error = std::async(
+            command.threads > 1 ? std::launch::async : std::launch::deferred, [alone = scenario, &options, &command] {
+              return command.accuracy.is_asked() ? 0 : retarget::estimated_error(alone, options);
+            });
         scenario.scene.threads = std::max(1, command.threads - 1);
         retarget::Simulation run = stages.run("simulation", [&] { return retarget::simulate(scenario, options); });
         stages.run("measurement", [&] {
           fill_report(scene, scenario, options, report);
-          report.accuracy.estimated_error_length = error.get();
+          if (!command.accuracy.is_asked()) report.accuracy.estimated_error_length = error.get();
           return 0;
         });
         return run;
       },
       scene.scenario);
   report.simulation = simulation.report;
-  report.outcome_ok = !simulation.report.diverged;
+  report.outcome_ok = !simulation.report.diverged && report.accuracy.is_met();
   report.warnings = scene.warnings;
   report.timing_s = stages.timing_s;
   try {
-    write_files(writer, scene, simulation, report);
+    write_files(writer, scene, simulation, report, chosen);
   } catch (const Error& error) {
     throw writer.as_seen(error);
   }
@@ -193,13 +235,18 @@ void add_simulate(CLI::App& app, int& exit_code) {
   sub->add_option("SCENE", command->scene, "TOML file (README, 'Scene files')")->required();
   sub->add_option("-o,--out", command->out, "Directory for motion, report and page; replaced as a whole")->required();
   sub->add_option("--method", command->method, "Time integration [the scene's]")->check(CLI::IsMember(io::method_names()));
-  sub->add_option("--duration", command->duration, "Seconds to simulate [the scene's]")->check(number_within(1e-3, kLongest));
+  sub->add_option("--duration", command->duration, "Seconds to simulate [the scene's]")
+      ->check(number_within(1e-3, kLongest));
+  add_accuracy_options(*sub, command->accuracy);
   CLI::Option* seed = sub->add_option("--seed", command->seed, "Of a random start [the scene's]");
-  CLI::Option* trace = sub->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
-  sub->add_option("--trace-rate", command->trace_rate, "Rows a second, a whole part of the scene's steps a second [all steps]")
+  CLI::Option* trace =
+      sub->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
+  sub->add_option("--trace-rate", command->trace_rate,
+                  "Rows a second, a whole part of the scene's steps a second [all steps]")
       ->check(number_within(0.01, 1e6))
       ->needs(trace);
-  sub->add_option("--threads", command->threads, "At most so many; the outcome does not hang on it")->check(number_within(1, 256));
+  sub->add_option("--threads", command->threads, "At most so many; the outcome does not hang on it")
+      ->check(number_within(1, 256));
   sub->add_flag("--json", command->json, "Print the report as JSON");
   sub->add_flag("--quiet", command->quiet, "No progress");
   sub->callback([command, seed, &exit_code] {

@@ -125,7 +125,7 @@ std::vector<PageContactRow> contact_rows(const retarget::PreparedTarget& prepare
 
 void write_performance_page(const std::filesystem::path& path, const retarget::Performer& performer,
                             const retarget::SignalSet& signals, const retarget::Performances& performances,
-                            const retarget::RunReport& report) {
+                            const retarget::RunReport& report, const std::string& curve) {
   const std::vector<Run> runs = runs_of(performances);
   PageInput page{report, performer.skin, performer.embedding, performer.mesh, {}, {}, {}, 0};
   page.motions.push_back({PageRole::kClip, true, performer.clip_skin});
@@ -147,6 +147,7 @@ void write_performance_page(const std::filesystem::path& path, const retarget::P
                            {{"replay", PageRole::kReplay, course.time_s, course.correction}}});
   }
   page.contacts = contact_rows(performer.prepared, runs.front());
+  page.accuracy_svg = curve;
   write_report_page(path, page);
 }
 

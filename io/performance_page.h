@@ -9,9 +9,10 @@ namespace hydrostat::io {
 
 /// Writes the report page of a creature's runs: the clip, the target and the replays in motion; the way of the COM, its height,
 /// heading, drift, slip, correction, saturation, the mean activation of each bone region, the missing wrench, and the contacts
-/// as planned and as they came. Throws Error when the file cannot be written.
+/// as planned and as they came; the curve of its accuracy (accuracy_svg) where there is one. Throws Error when the file cannot
+/// be written.
 void write_performance_page(const std::filesystem::path& path, const retarget::Performer& performer,
                             const retarget::SignalSet& signals, const retarget::Performances& performances,
-                            const retarget::RunReport& report);
+                            const retarget::RunReport& report, const std::string& curve = "");
 
 }  // namespace hydrostat::io

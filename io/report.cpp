@@ -174,6 +174,13 @@ void fill(Group& group, const retarget::AccuracyReport& accuracy) {
   group.add("material", accuracy.material);
   group.add("dt_s", accuracy.dt_s);
   group.add("estimated_error_length", accuracy.estimated_error_length);
+  if (accuracy.max_error_length > 0) {
+    group.add("max_error_length", accuracy.max_error_length);
+    group.add("work_saved", accuracy.work_saved);
+  } else {
+    group.add_nothing("max_error_length");
+    group.add_nothing("work_saved");
+  }
 }
 
 void fill(Group& group, const std::vector<std::pair<std::string, double>>& timing_s) {

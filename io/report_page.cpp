@@ -156,6 +156,7 @@ Json page_json(const PageInput& input) {
   for (const PageChart& chart : input.charts) json["charts"].push_back(chart_json(chart));
   json["contacts"] = Json::array();
   for (const PageContactRow& row : input.contacts) json["contacts"].push_back(contact_json(row));
+  json["accuracy_svg"] = input.accuracy_svg;
   return json;
 }
 

@@ -66,6 +66,7 @@ struct PageInput {
   bool has_ground = true;
   Eigen::Vector3d ground_normal = Eigen::Vector3d::UnitY();
   std::vector<PageObstacle> obstacles = {};
+  std::string accuracy_svg = {};  // error against time of what was tried, where an accuracy was asked for
 };
 
 /// Writes one HTML file that needs nothing else, no network either: the view of the motions, the charts, the contact

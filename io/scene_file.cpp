@@ -9,7 +9,7 @@
 #include "io/toml_reader.h"
 #include "physics/element_body.h"
 #include "physics/element_calibration.h"
-#include "retarget/self_contact_plan.h"
+#include "retarget/effect_plan.h"
 
 namespace hydrostat::io {
 namespace {
@@ -23,6 +23,7 @@ constexpr double kSteepest = 80;             // [deg] of the ground
 constexpr double kMostActivation = 0.95;     // of all waves on one constraint: 1 would let it vanish
 constexpr double kLeastPoissonsRatio = 0.25; // of springs
 constexpr double kFriction = 0.8;
+constexpr double kAirDensity = 1.2;          // [kg/m3]
 constexpr double kOrigins = 64;              // [m] between the places that may be the local origin
 const std::string kSprings = "springs";
 const std::vector<std::string> kLaws{kSprings, "stable_neo_hookean", "corotated_linear"};
@@ -47,9 +48,9 @@ class SceneReader {
     read_surroundings();
     for (const TomlReader& clamp : root_.tables("clamp")) read_clamp(clamp);
     const StartShape start = place(*body);
+    for (const TomlReader& push : root_.tables("push")) read_push(push);
     read_effects(start);
     physics::touch_with_whole_surface(scenario_.scene);
-    for (const TomlReader& push : root_.tables("push")) read_push(push);
     body->refuse_others();
     return std::move(scenario_);
   }
@@ -208,6 +209,26 @@ class SceneReader {
       ground->refuse_others();
     }
     for (const TomlReader& obstacle : root_.tables("obstacle")) read_obstacle(obstacle);
+    if (const std::optional<TomlReader> water = root_.table("water")) {
+      physics::FluidOf<Dim> fluid;
+      if (water->has("level_m")) fluid.level = water->number("level_m", kPlace) - scenario_.origin[1];
+      scene.water = read_fluid(*water, fluid);
+    }
+    if (const std::optional<TomlReader> air = root_.table("air")) {
+      physics::FluidOf<Dim> fluid;
+      fluid.density = kAirDensity;
+      scene.air = read_fluid(*air, fluid);
+    }
+  }
+
+  physics::FluidOf<Dim> read_fluid(const TomlReader& table, physics::FluidOf<Dim> fluid) const {
+    constexpr Within kCoefficient{.least = 0, .most = 100};
+    fluid.density = table.number_or("density_kg_m3", fluid.density, {.least = 0, .most = 1e5, .without_least = true});
+    fluid.velocity = table.numbers_or("velocity_m_s", VectorOf<Dim>::Zero());
+    fluid.drag = table.number_or("drag", fluid.drag, kCoefficient);
+    fluid.drag_along = table.number_or("drag_along", fluid.drag_along, kCoefficient);
+    table.refuse_others();
+    return fluid;
   }
 
   void read_obstacle(const TomlReader& table) {
@@ -266,15 +287,24 @@ class SceneReader {
 
   void read_effects(StartShape start) {
     physics::SceneOf<Dim>& scene = scenario_.scene;
-    std::string wish = kWishes.front();
+    std::map<std::string, retarget::Wish> wishes;
     double friction = scene.has_ground ? scene.ground.friction : kFriction;
     if (const std::optional<TomlReader> table = root_.table("effects")) {
-      wish = table->choice_or_first("self_contact", kWishes);
+      const auto read = [&](const std::string& name) {
+        const std::string wish = table->choice_or_first(name, kWishes);
+        wishes[name] = wish == "on" ? retarget::Wish::kOn : wish == "off" ? retarget::Wish::kOff : retarget::Wish::kAuto;
+      };
+      read("self_contact");
+      for (const std::string& name : retarget::switchable_effects()) read(name);
       friction = table->number_or("self_friction", friction, kFrictionRange);
       table->refuse_others();
+      if (wishes["self_contact"] == retarget::Wish::kOff && table->has("self_friction")) {
+        throw table->refusal("self_friction", "'self_contact' is off, so that nothing rubs", "Leave one of the two out.");
+      }
     }
-    retarget::SelfContactPlan plan = retarget::plan_self_contact<Dim>(
-        scenario_, start, wish == "on" ? retarget::Wish::kOn : wish == "off" ? retarget::Wish::kOff : retarget::Wish::kAuto, friction);
+    const std::string broken = retarget::plan_effects<Dim>(wishes, scenario_);
+    if (!broken.empty()) throw root_.refusal("effects", broken, "Add what it needs, or leave the effect to 'auto'.");
+    retarget::SelfContactPlan plan = retarget::plan_self_contact<Dim>(scenario_, start, wishes["self_contact"], friction);
     scene.self_contact = std::move(plan.settings);
     scenario_.self_contact_reason = std::move(plan.reason);
   }
@@ -312,6 +342,7 @@ void read_in_dimension(const TomlReader& root, SceneFile& scene) {
   scene.scenario = reader.read();
   const std::optional<physics::Method> method = method_named(root.choice_or_first("method", method_names()));
   scene.method = method.value_or(physics::Method::kExplicit);
+  scene.method_is_auto = !method;
 }
 
 }  // namespace
@@ -326,15 +357,19 @@ std::optional<physics::Method> method_named(const std::string& name) {
   return physics::method_named(name);
 }
 
-SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed, std::optional<int> nodes) {
+SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed, std::optional<int> nodes,
+                          const std::string& element) {
   toml::table table = parse_toml(file);
   if (toml::table* const body = table["body"].as_table(); body != nullptr && nodes) {
     body->erase("cell_size_m");
     body->insert_or_assign("nodes", *nodes);
   }
+  if (toml::table* const body = table["body"].as_table(); body != nullptr && !element.empty()) {
+    body->insert_or_assign("element", element);
+  }
   const TomlReader root(table, file, "");
   for (const char* key : {"dimension", "dt_s", "duration_s", "seed", "method", "gravity_m_s2", "body", "material", "region", "ground",
-                          "obstacle", "clamp", "activation", "push", "effects"}) {
+                          "obstacle", "clamp", "activation", "push", "water", "air", "effects"}) {
     root.has(key);
   }
   root.refuse_others();

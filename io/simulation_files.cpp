@@ -119,7 +119,7 @@ void write_simulation_glb(const std::filesystem::path& path, const SceneFile& sc
 }
 
 void write_simulation_page(const std::filesystem::path& path, const SceneFile& scene, const Simulation& simulation,
-                           const retarget::RunReport& report) {
+                           const retarget::RunReport& report, const std::string& curve) {
   std::visit(
       [&]<int Dim>(const ScenarioOf<Dim>& scenario) {
         const ShownBody body = shown_body(scenario);
@@ -134,6 +134,7 @@ void write_simulation_page(const std::filesystem::path& path, const SceneFile& s
         for (std::size_t o = 0; o < scenario.scene.obstacles.size(); ++o) {
           page.obstacles.push_back(page_obstacle<Dim>(scenario.scene.obstacles[o], simulation.obstacle_travels[o], scenario.length));
         }
+        page.accuracy_svg = curve;
         write_report_page(path, page);
       },
       scene.scenario);

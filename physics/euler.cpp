@@ -54,6 +54,8 @@ class EulerStepper final : public StepperOf<Dim> {
   /// Steps that ended above the minimum.
   long guard_steps() const override { return unsolved_; }
 
+  StepWork work() const override { return work_; }
+
   void forget() override { contact_.forget(); }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -171,6 +173,10 @@ class EulerStepper final : public StepperOf<Dim> {
   /// whose approximate Wolfe conditions are that of the slope.
   bool move_downhill(double dt, PointsOf<Dim>& x) {
     const BodyOf<Dim>& body = scene_.body;
+    ++work_.rounds;
+    ++work_.assemblies;
+    work_.products += matrix_.products_to_factor() + matrix_.products_to_solve();
+    work_.passes += 2;  // the potential here and the residual before
     matrix_.set_zero();
     matrix_.add_mass(body, 1 / (dt * dt));
     forces_.add_stiffness(x, 1, matrix_);
@@ -185,6 +191,7 @@ class EulerStepper final : public StepperOf<Dim> {
     if (!(slope < 0)) return false;
     double part = 1;
     for (int k = 0; k < kHalvings; ++k, part /= 2) {
+      ++work_.passes;
       trial_ = x + part * direction_.reshaped(Dim, body.node_count());
       if (potential(trial_, dt) <= here + kArmijo * part * slope + kRounding * std::abs(here)) {
         x.swap(trial_);
@@ -246,6 +253,7 @@ class EulerStepper final : public StepperOf<Dim> {
   Eigen::VectorXd direction_;
   StateOf<Dim> start_;
   long unsolved_ = 0;
+  StepWork work_;
 };
 
 }  // namespace

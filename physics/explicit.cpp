@@ -69,6 +69,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / (kStepMargin * longest_substep(mode_at_rest_))); }
 
+  StepWork work() const override { return work_; }
+
   void forget() override { contact_.forget(); }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -81,6 +83,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
     const double count = std::ceil(dt / (kStepMargin * longest_substep(mode)));
     if (!(count <= most_substeps_)) return Termination::kDiverged;
     const int substeps = static_cast<int>(count);
+    work_.passes += substeps;
+    work_.rounds += substeps;
     const double h = dt / substeps;
     clear(impulses);
     contact_.forget_reach();
@@ -152,6 +156,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
   StateOf<Dim> start_;
   StiffestMode mode_at_rest_{};  // of the body at rest
   double shortest_edge_ = 0;     // [m]
+  StepWork work_;
 };
 
 }  // namespace

@@ -35,6 +35,7 @@ class GuardedStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return accurate_->substep(dt); }
   long guard_steps() const override { return guard_steps_; }
+  StepWork work() const override { return euler_ == nullptr ? accurate_->work() : accurate_->work() + euler_->work(); }
   void forget() override {
     accurate_->forget();
     if (euler_ != nullptr) euler_->forget();

@@ -72,6 +72,8 @@ class ImplicitStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / longest_substep_); }
 
+  StepWork work() const override { return work_; }
+
   void forget() override { contact_.forget(); }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -156,6 +158,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
 
   /// What the step minimises over the places at its end [J].
   double potential(const PointsOf<Dim>& x) {
+    ++work_.passes;
     middle_ = 0.5 * (start_.x + x);
     double sum = 2 * forces_.elastic_energy(middle_);
     if (forces_.has_dashpots()) sum += 2 * elastic_energy<Dim>(dashpots_, middle_, ones_);
@@ -168,6 +171,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
   /// Fills residual_, the gradient of the potential [N], and force_, of the middle, without contact.
   void find_residual(const PointsOf<Dim>& x) {
     const BodyOf<Dim>& body = scene_.body;
+    ++work_.passes;
     middle_ = 0.5 * (start_.x + x);
     force_.setZero();
     forces_.add_elastic_forces(middle_, force_);
@@ -228,6 +232,8 @@ class ImplicitStepper final : public StepperOf<Dim> {
   }
 
   bool make_matrix(const PointsOf<Dim>& x) {
+    ++work_.assemblies;
+    work_.products += matrix_.products_to_factor();
     middle_ = 0.5 * (start_.x + x);
     matrix_.set_zero();
     matrix_.add_mass(scene_.body, 2 / (dt_ * dt_));
@@ -243,6 +249,8 @@ class ImplicitStepper final : public StepperOf<Dim> {
 
   /// Two-loop recursion. Source: Nocedal, Wright, "Numerical optimization", 2006, algorithm 7.4.
   void find_direction() {
+    ++work_.rounds;
+    work_.products += matrix_.products_to_solve();
     std::array<double, kMemory> along{};
     const int oldest = std::max(0, count_ - kMemory);
     direction_ = -residual_.reshaped();
@@ -337,6 +345,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
   std::array<Pair, kMemory> pairs_;
   int count_ = 0, since_matrix_ = 0;  // pairs since they were last cleared; iterations since the matrix was made
   bool has_matrix_ = false;
+  StepWork work_;
 };
 
 }  // namespace

@@ -1,11 +1,22 @@
 #pragma once
 
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "physics/contact.h"
 #include "physics/obstacle.h"
 
 namespace hydrostat::physics {
+
+/// Water or air around the body.
+template <int Dim>
+struct FluidOf {
+  double density = 1000;                                   // [kg/m3]
+  double level = std::numeric_limits<double>::infinity();  // [m] of its surface, upward; infinite: it is everywhere
+  VectorOf<Dim> velocity = VectorOf<Dim>::Zero();          // [m/s] of its flow
+  double drag = 1, drag_along = 0.02;                      // [-] against and along a face that moves in it
+};
 
 /// What acts on the body: nothing else does.
 template <int Dim>
@@ -20,6 +31,7 @@ struct SceneOf {
   std::vector<ObstacleOf<Dim>> obstacles = {};
   SelfContact self_contact = {};
   VectorOf<Dim> gravity = -9.81 * VectorOf<Dim>::UnitY();  // [m/s2]
+  std::optional<FluidOf<Dim>> water = {}, air = {};        // see plan_effects
   int threads = 1;  // at most so many share a step of a large body; the outcome does not hang on it
 };
 using Scene = SceneOf<3>;
@@ -27,13 +39,13 @@ using Scene = SceneOf<3>;
 /// The impulses of one step [N s], with which the momentum of the body balances.
 template <int Dim>
 struct ImpulsesOf {
-  PointsOf<Dim> contact;        // Dim x P, by ground and obstacles on each contact point
-  PointsOf<Dim> contact_nodes;  // Dim x N, the same spread on the nodes
-  SpinOf<Dim> contact_moment;   // [N m s] about the world's origin
-  PointsOf<Dim> effect_nodes;   // Dim x N, declared effects (pushes)
-  SpinOf<Dim> effect_moment;    // [N m s]
-  SpinOf<Dim> gravity_moment;   // [N m s]
-  PointsOf<Dim> hold;           // Dim x held nodes, by what holds them where they are
+  PointsOf<Dim> contact;              // Dim x P, by ground and obstacles on each contact point
+  PointsOf<Dim> contact_nodes;        // Dim x N, the same spread on the nodes
+  SpinOf<Dim> contact_moment;         // [N m s] about the world's origin
+  PointsOf<Dim> effect_nodes;         // Dim x N, declared effects (pushes)
+  SpinOf<Dim> effect_moment;          // [N m s]
+  SpinOf<Dim> gravity_moment;         // [N m s]
+  PointsOf<Dim> hold;                 // Dim x held nodes, by what holds them where they are
   PointsOf<Dim> internal_nodes = {};  // Dim x N, by the body's own surface: sums to zero and has no moment; empty without
                                       // self-contact
   double obstacle_work = 0;  // [J] done on the body by obstacles that move and by what lifts it out of them and of itself

@@ -39,6 +39,8 @@ class SpringStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return stepper_->substep(dt); }
 
+  StepWork work() const override { return stepper_->work(); }
+
   void forget() override { stepper_->forget(); }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,

@@ -104,7 +104,10 @@ void SystemMatrixOf<Dim>::find_factor_pattern(const BodyOf<Dim>& body) {
     source_begin_.push_back(static_cast<int>(source_.size()));
   }
   column_begin_ = {0};
-  for (const int c : count) column_begin_.push_back(column_begin_.back() + c);
+  for (const int c : count) {
+    column_begin_.push_back(column_begin_.back() + c);
+    products_to_factor_ += 0.5 * c * (c + 1.0);
+  }
   row_.resize(static_cast<std::size_t>(column_begin_.back()));
   std::vector<int> next(column_begin_.begin(), column_begin_.end() - 1);
   for (int k = 0; k < nodes; ++k) {

@@ -44,6 +44,9 @@ class SystemMatrixOf {
   bool factor();
   /// x <- A^-1 x for each column; allocates only when the number of columns changes. With couplings to kCouplingError.
   void solve_in_place(Eigen::Ref<Eigen::MatrixXd> columns) const;
+  /// Products of blocks that factor and solve_in_place (of one column) take.
+  double products_to_factor() const { return products_to_factor_; }
+  double products_to_solve() const { return 2.0 * static_cast<double>(row_.size()) + static_cast<double>(order_.size()); }
   const Eigen::SparseMatrix<double>& lower() const { return matrix_; }
   Eigen::Index size() const { return matrix_.rows(); }
 
@@ -74,6 +77,7 @@ class SystemMatrixOf {
   std::vector<int> order_, column_begin_, row_, entry_begin_, source_begin_;
   std::vector<Entry> entry_;    // by rows, columns ascending
   std::vector<Source> source_;  // by rows
+  double products_to_factor_ = 0;
   std::vector<BlockOf<Dim>> l_, d_inverse_, work_;
   mutable Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> scratch_;
 

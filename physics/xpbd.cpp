@@ -43,6 +43,8 @@ class XpbdStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / substep_); }
 
+  StepWork work() const override { return work_; }
+
   void forget() override { contact_.forget(); }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -57,6 +59,8 @@ class XpbdStepper final : public StepperOf<Dim> {
     held_impulse_.setZero();
     const int substeps = static_cast<int>(std::ceil(dt / substep_));
     const double h = dt / substeps;
+    work_.sweeps += substeps;
+    work_.rounds += substeps;
     for (int s = 0; s < substeps; ++s) {
       push(h, effect_force, state, impulses);
       from_ = state.x;
@@ -224,6 +228,7 @@ class XpbdStepper final : public StepperOf<Dim> {
   PointsOf<Dim> held_impulse_;  // [N s] by the constraints on held nodes in this step; empty where none is held
   double substep_ = 0;          // [s] the longest
   double size_ = 0;             // [m]
+  StepWork work_;
 };
 
 }  // namespace

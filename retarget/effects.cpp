@@ -91,7 +91,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
        ms(std::max(0.0, elastic - edges_alone) * passes)},
       {"damping", "on", "a dashpot along every constraint; timed as a pass over the constraints of its own",
        ms(damping * passes)},
-      {"air_drag", "off", "not simulated in this version: the creature moves in still air without drag", 0},
+      {"air_drag", "off", "a creature moves in still air without drag; scenes have [air]", 0},
       {"water", "off", "there is no water", 0},
       {"pushes", pushed ? "on" : "off", pushed ? "asked for by --push" : "none was asked for", ms(pushing * passes)},
       {"embedding", "on", "the skin follows the nodes of its tets; counted at 60 frames a second, outside the solver",

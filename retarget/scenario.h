@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,13 @@ struct Clamp {
   double until_s = 1e300;
 };
 
+/// Whether an effect is on, and why.
+struct EffectDecision {
+  std::string name;
+  bool is_on = false;
+  std::string reason;
+};
+
 /// A body and all that happens to it: what a simulation without a clip starts from. All places are about a local origin, so that
 /// far from the world's no digits are lost.
 template <int Dim>
@@ -41,6 +49,8 @@ struct ScenarioOf {
   physics::SceneOf<Dim> scene;
   physics::StateOf<Dim> start;
   std::vector<Wave> waves;
+  /// In the place of waves, where it is given: fills the activations (E) at a time [s].
+  std::function<void(double time_s, Eigen::VectorXd& activation)> drive = {};
   std::vector<PushOf<Dim>> pushes;
   std::vector<MoveOf<Dim>> moves;
   std::vector<Clamp> clamps;  // those that hold at the start are the scene's body's `held`
@@ -48,6 +58,7 @@ struct ScenarioOf {
   double length = 1, size = 1;  // L [m], longest extent of the rest shape's box; D [m]
   double youngs_modulus = 0;    // [Pa] of the stiffest region
   std::string self_contact_reason = "nobody asked for it";  // why it is on or off
+  std::vector<EffectDecision> decisions = {};  // of the other effects that can be told on or off
 };
 
 /// Springs and volume energy with the Lamé parameters of the material, for a lattice whose edges point everywhere: such a

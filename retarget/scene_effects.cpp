@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "physics/elastic_forces.h"
+#include "physics/fluid.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/simulation.h"
 
@@ -63,10 +63,6 @@ double ms_of_volume(const physics::BodyOf<Dim>& body, const physics::StateOf<Dim
   return std::max(0.0, all - ms_of([&] { physics::add_elastic_forces(springs, state.x, activation, force); }));
 }
 
-std::string many(std::size_t count, const char* one) {
-  return std::to_string(count) + " " + one + (count == 1 ? "" : "s");
-}
-
 }  // namespace
 
 template <int Dim>
@@ -80,42 +76,47 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
   const auto ms_of = [&](const auto& work) { return 1000 * passes * seconds_of(work); };
 
   const bool has_volume_springs = body.volume_stiffness.size() > 0;
-  const double volume = has_volume_springs ? ms_of_volume(body, state, passive, ms_of) : 0;
-  const bool has_gravity = scene.gravity.norm() > 0, has_damping = body.edge_damping.maxCoeff() > 0;
+  const bool has_damping = body.edge_damping.maxCoeff() > 0, pushed = !scenario.pushes.empty(), touches_itself = scene.self_contact.is_on;
   const bool has_friction = (scene.has_ground && scene.ground.friction > 0) ||
                             std::any_of(scene.obstacles.begin(), scene.obstacles.end(), [](const auto& o) { return o.friction > 0; });
   const bool touches = scene.has_ground || !scene.obstacles.empty();
   const double contact = touches ? 1000 * contact_seconds(scenario, options) : 0;
-  const double gravity = has_gravity ? ms_of([&] { force.colwise() += scene.gravity; }) : 0;
-  const double damping = has_damping ? ms_of([&] { physics::add_damping_forces(body, state.x, state.v, force); }) : 0;
-  const bool pushed = !scenario.pushes.empty(), touches_itself = scene.self_contact.is_on;
-  const double pushing = pushed ? ms_of([&] { force += state.v; }) : 0;
-  char pull[60];
-  std::snprintf(pull, sizeof pull, "%.3g m/s2; timed as a pass over the nodes of its own", scene.gravity.norm());
-  const std::string in_ground = scene.has_ground ? "counted with the ground's contact" : "the cost is that of all contact";
-  const auto state_of = [](bool is_on) { return is_on ? "on" : "off"; };
-  return {
-      {"gravity", state_of(has_gravity), has_gravity ? pull : "the scene has none", gravity},
-      {"ground", state_of(scene.has_ground),
-       scene.has_ground ? "the scene has one; the cost is that of all contact" : "the scene has none", scene.has_ground ? contact : 0},
-      {"friction", state_of(has_friction), has_friction ? "solved with the contact and counted there" : "nothing rubs", 0},
-      {"obstacles", state_of(!scene.obstacles.empty()),
-       scene.obstacles.empty() ? "the scene has none" : many(scene.obstacles.size(), "obstacle") + " in the scene; " + in_ground,
-       scene.has_ground ? 0 : contact},
-      {"self_contact", state_of(touches_itself), scenario.self_contact_reason + (touches_itself ? "; timed from the start" : ""),
-       touches_itself ? 1000 * self_contact_seconds(scenario, options) : 0},
-      {"volume", "on",
-       has_volume_springs ? "every element keeps its volume by a spring" : "a part of the elements' law, as far as Poisson's ratio says; counted there",
-       volume},
-      {"damping", state_of(has_damping),
-       has_damping ? "a dashpot along every constraint; timed as a pass over the constraints of its own" : "damping_time_s is 0", damping},
-      {"air_drag", "off", "not simulated in this version", 0},
-      {"water", "off", "there is no water", 0},
-      {"pushes", state_of(pushed), pushed ? std::to_string(scenario.pushes.size()) + " in the scene" : "the scene has none", pushing},
-      {"embedding", "off", "the skin is the mesh's own surface", 0},
-      {"wobble", "off", "not simulated in this version: the skin has no motion of its own", 0},
-      {"fracture", "off", "not simulated in this version: the body does not tear", 0},
+  const auto cost_of_fluid = [&](const std::optional<physics::FluidOf<Dim>>& fluid) {
+    if (!fluid) return 0.0;
+    physics::FluidEffect<Dim> effect(scene, *fluid);
+    return 1000 / options.dt_s * seconds_of([&] { effect.add_forces(options.dt_s, state, force); });
   };
+  std::vector<EffectReport> effects;
+  // What the plan decided, or, of a scenario that nobody planned, what it has; and what the cost is of.
+  const auto tell = [&](const char* name, bool is_on, const char* otherwise, const std::string& costs, double ms) {
+    EffectReport effect{name, is_on ? "on" : "off", is_on ? "the scene has it" : otherwise, ms};
+    for (const EffectDecision& decision : scenario.decisions) {
+      if (decision.name == name) effect.reason = decision.reason;
+    }
+    if (is_on && !costs.empty()) effect.reason += "; " + costs;
+    effects.push_back(std::move(effect));
+  };
+  tell("gravity", scene.gravity.norm() > 0, "the scene has none", "timed as a pass over the nodes of its own",
+       scene.gravity.norm() > 0 ? ms_of([&] { force.colwise() += scene.gravity; }) : 0);
+  tell("ground", scene.has_ground, "the scene has none", "the cost is that of all contact", scene.has_ground ? contact : 0);
+  tell("friction", has_friction, "nothing rubs", "solved with the contact and counted there", 0);
+  tell("obstacles", !scene.obstacles.empty(), "the scene has none",
+       scene.has_ground ? "counted with the ground's contact" : "the cost is that of all contact", scene.has_ground ? 0 : contact);
+  effects.push_back({"self_contact", touches_itself ? "on" : "off",
+                     scenario.self_contact_reason + (touches_itself ? "; timed from the start" : ""),
+                     touches_itself ? 1000 * self_contact_seconds(scenario, options) : 0});
+  tell("volume", has_volume_springs || !body.elements.empty(), "nothing keeps volume", "",
+       has_volume_springs ? ms_of_volume(body, state, passive, ms_of) : 0);
+  tell("damping", has_damping, "damping_time_s is 0", "timed as a pass over the constraints of its own",
+       has_damping ? ms_of([&] { physics::add_damping_forces(body, state.x, state.v, force); }) : 0);
+  tell("air_drag", scene.air.has_value(), "the scene tells of no air", "one pass over the surface a step", cost_of_fluid(scene.air));
+  tell("water", scene.water.has_value(), "there is no water", "buoyancy and drag, one pass over the surface a step",
+       cost_of_fluid(scene.water));
+  tell("pushes", pushed, "the scene has none", "", pushed ? ms_of([&] { force += state.v; }) : 0);
+  tell("embedding", false, "the skin is the mesh's own surface", "", 0);
+  tell("wobble", false, "not simulated in this version: the skin has no motion of its own", "", 0);
+  tell("fracture", false, "not simulated in this version: the body does not tear", "", 0);
+  return effects;
 }
 template std::vector<EffectReport> effects_of<2>(const ScenarioOf<2>&, const SimulationOptions&);
 template std::vector<EffectReport> effects_of<3>(const ScenarioOf<3>&, const SimulationOptions&);

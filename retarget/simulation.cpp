@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "physics/effect.h"
 #include "physics/internal_forces.h"
 #include "physics/self_contact.h"
 #include "retarget/cpu_seconds.h"
@@ -88,6 +89,8 @@ class Course {
     double sum() const { return kinetic + elastic + gravity; }
   };
   Energy energy() const;
+  double now() const { return options_.begin_s + static_cast<double>(done_) * options_.dt_s; }
+  void drive(double time_s);
   void set_velocities(double begin);
   void let_go();
   physics::Termination step();
@@ -103,6 +106,7 @@ class Course {
   physics::SceneOf<Dim> scene_;  // a copy, whose obstacles change their velocities
   const physics::BodyOf<Dim>& body_;
   std::unique_ptr<physics::StepperOf<Dim>> stepper_;
+  const std::vector<std::unique_ptr<physics::EffectOf<Dim>>> effects_;
   physics::InternalForces<Dim> forces_;
   physics::SelfContactSet<Dim> itself_;
   const long steps_, steps_per_frame_;
@@ -133,6 +137,7 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       scene_(scenario.scene),
       body_(scene_.body),
       stepper_(physics::make_stepper(options.method, scene_)),
+      effects_(physics::plan_effects(scene_)),
       forces_(body_),
       itself_(scene_),
       steps_(std::max(1L, std::lround(options.duration_s / options.dt_s))),
@@ -147,9 +152,11 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       impulses_(physics::make_impulses(scene_)),
       effect_(Dim, body_.node_count()) {
   if (state_.obstacle_travel.cols() == 0) state_.obstacle_travel.setZero(Dim, static_cast<Eigen::Index>(scene_.obstacles.size()));
-  activations_at(scenario.waves, 0.5 * options.dt_s, activation_);
+  drive(options.begin_s + 0.5 * options.dt_s);
   forces_.set_activation(activation_);
-  for (const Clamp& clamp : scenario.clamps) next_release_s_ = std::min(next_release_s_, clamp.until_s);
+  for (const Clamp& clamp : scenario.clamps) {
+    if (clamp.until_s > options.begin_s) next_release_s_ = std::min(next_release_s_, clamp.until_s);
+  }
   energy_at_start_ = energy().sum();
   SimulationReport& report = result_.report;
   report.dimension = Dim;
@@ -185,23 +192,32 @@ void Course<Dim>::set_velocities(double begin) {
 /// From here on another scene is stepped, in which fewer nodes are held.
 template <int Dim>
 void Course<Dim>::let_go() {
-  const double now = static_cast<double>(done_) * options_.dt_s;
-  hold_at(scenario_.clamps, now, scene_.body.held);
+  hold_at(scenario_.clamps, now(), scene_.body.held);
   next_release_s_ = 1e300;
   for (const Clamp& clamp : scenario_.clamps) {
-    if (clamp.until_s > now) next_release_s_ = std::min(next_release_s_, clamp.until_s);
+    if (clamp.until_s > now()) next_release_s_ = std::min(next_release_s_, clamp.until_s);
   }
   guard_steps_ += stepper_->guard_steps();
+  result_.work = result_.work + stepper_->work();
   stepper_ = physics::make_stepper(options_.method, scene_);
   impulses_ = physics::make_impulses(scene_);
 }
 
 template <int Dim>
+void Course<Dim>::drive(double time_s) {
+  if (scenario_.drive) {
+    scenario_.drive(time_s, activation_);
+  } else {
+    activations_at(scenario_.waves, time_s, activation_);
+  }
+}
+
+template <int Dim>
 physics::Termination Course<Dim>::step() {
-  const double dt = options_.dt_s, begin = static_cast<double>(done_) * dt;
+  const double dt = options_.dt_s, begin = now();
   before_ = state_;
-  if (!scenario_.waves.empty()) {
-    activations_at(scenario_.waves, begin + 0.5 * dt, activation_);
+  if (scenario_.drive || !scenario_.waves.empty()) {
+    drive(begin + 0.5 * dt);
     work_ -= forces_.elastic_energy(state_.x);
     forces_.set_activation(activation_);
     work_ += forces_.elastic_energy(state_.x);
@@ -209,9 +225,10 @@ physics::Termination Course<Dim>::step() {
   set_velocities(begin);
   if (begin >= next_release_s_) let_go();
   const VectorOf<Dim> pushed = pushed_velocity(scenario_.pushes, begin, begin + dt);
-  const bool has_effect = !pushed.isZero(0);
+  const bool has_effect = !effects_.empty() || !pushed.isZero(0);
   if (has_effect) effect_ = (pushed / dt) * body_.mass.transpose();
   const double began = thread_seconds();
+  for (const auto& effect : effects_) effect->add_forces(dt, state_, effect_);
   const physics::Termination termination = stepper_->step(dt, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
   busy_s_ += thread_seconds() - began;
   if (termination == physics::Termination::kDiverged) return termination;
@@ -289,6 +306,7 @@ template <int Dim>
 void Course<Dim>::write_frame() {
   const Energy here = energy();
   frames_.push_back(column_of<Dim>(state_.x));
+  if (options_.velocities) result_.velocities.emplace_back(column_of<Dim>(state_.v).reshaped(3, state_.v.cols()));
   travels_.push_back(state_.obstacle_travel);
   com_.push_back(in_space<Dim>(physics::centre_of_mass(body_, state_.x) + scenario_.origin));
   const double force = impulses_.contact.colwise().norm().sum() / options_.dt_s;
@@ -329,6 +347,7 @@ Simulation Course<Dim>::finish() {
   report.duration_s = static_cast<double>(done_) * options_.dt_s;
   report.energy_end_mgl = (energy().sum() + energy_of_origin_) / (weight_ * scenario_.length);
   report.guard_steps = static_cast<int>(guard_steps_ + stepper_->guard_steps());
+  result_.work = result_.work + stepper_->work();
   report.work_mgl = work_ / (weight_ * scenario_.length);
   const Eigen::Vector3d up = in_space<Dim>(scene_.has_ground ? scene_.ground.normal : VectorOf<Dim>::UnitY());
   const Eigen::Vector3d way =
@@ -374,21 +393,6 @@ template <int Dim>
 Simulation simulate(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
   return Course<Dim>(scenario, options).play();
 }
-template <int Dim>
-double substep_error(const ScenarioOf<Dim>& scenario, SimulationOptions options) {
-  options.trace = options.figures = false;
-  options.duration_s = std::min(1.0, options.duration_s);
-  const Motion whole = simulate(scenario, options).motion;
-  const double substep = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
-  options.frame_rate_hz = whole.rate_hz;
-  options.dt_s /= 2 * std::max(1.0, std::round(options.dt_s / substep));
-  const Motion halved = simulate(scenario, options).motion;
-  const Eigen::Index frames = std::min(whole.count(), halved.count());
-  const double squared = (whole.frames.leftCols(frames) - halved.frames.leftCols(frames)).squaredNorm();
-  return std::sqrt(squared / static_cast<double>(frames * scenario.scene.body.node_count())) / scenario.length;
-}
-template double substep_error<2>(const ScenarioOf<2>&, SimulationOptions);
-template double substep_error<3>(const ScenarioOf<3>&, SimulationOptions);
 
 template Simulation simulate<2>(const ScenarioOf<2>&, const SimulationOptions&);
 template Simulation simulate<3>(const ScenarioOf<3>&, const SimulationOptions&);

@@ -10,9 +10,11 @@ namespace hydrostat::retarget {
 struct SimulationOptions {
   physics::Method method = physics::Method::kExplicit;
   double dt_s = 1.0 / 240;
+  double begin_s = 0;  // when the start is: waves, pushes, moves and clamps count from 0
   double duration_s = 2;
   double frame_rate_hz = 60;  // of the motion, at most
   bool figures = true;  // false: the motion alone, without report and course
+  bool velocities = false;
   bool trace = false;
   int steps_per_row = 1;  // of the trace
 };
@@ -35,17 +37,14 @@ struct Simulation {
   SimulationCourse course;
   SimulationReport report;
   Trace trace;  // filled where asked
+  physics::StepWork work;                      // of the stepper
+  std::vector<physics::PointsOf<3>> velocities;  // [m/s] 3 x N of each frame, filled where asked
 };
 
 /// Lets the body go from its start: nothing acts but what the scenario holds. Stops where the simulation diverges; all that is
 /// handed over ends before that step. The options must break no rule.
 template <int Dim>
 Simulation simulate(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
-
-/// How far the nodes move [per L, RMS over nodes and the frames of at most the first second] when the method's own substep is
-/// halved.
-template <int Dim>
-double substep_error(const ScenarioOf<Dim>& scenario, SimulationOptions options);
 
 /// Every effect that a scene can have: whether it is on, why, and what it costs, timed here on the scene's own body.
 template <int Dim>

@@ -120,7 +120,12 @@ function add_timing(parent, timing) {
   }
 }
 
-export function add_tables(parent, report) {
+/** Error against time of what was tried; empty where no accuracy was asked for. */
+function add_accuracy(parent, svg) {
+  if (svg) element(section(parent, 'Accuracy against time'), 'div').innerHTML = svg;
+}
+
+export function add_tables(parent, report, accuracy_svg) {
   const main = element(parent, 'div');
   const details = element(parent, 'div', 'details');
   if (report.warnings.length > 0) {
@@ -128,6 +133,7 @@ export function add_tables(parent, report) {
     for (const warning of report.warnings) element(list, 'li', '', warning);
   }
   add_metrics(main, report.replay);
+  add_accuracy(main, accuracy_svg);
   if (report.simulation) add_group(main, 'The simulation', report.simulation);
   add_effects(main, report.effects);
   add_timing(main, report.timing_s);

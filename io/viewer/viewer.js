@@ -76,7 +76,7 @@ function make_stage() {
 say_what_this_is();
 const stage = make_stage();
 const charts = add_charts({ charts: find('charts'), contacts: find('contacts') }, page, end, set_time);
-add_tables(find('tables'), report);
+add_tables(find('tables'), report, page.accuracy_svg);
 
 function set_time(t) {
   state.t = Math.min(Math.max(0, t), end);

@@ -1,0 +1,192 @@
+#include "cli/asked_accuracy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "cli/command_line.h"
+#include "cli/number_option.h"
+#include "retarget/performed_scenario.h"
+
+namespace hydrostat::cli {
+namespace {
+
+// Three points of the curve: what an eye forgives, what it does not see, what a measurement wants [per L].
+const std::map<std::string, double> kGrades{{"draft", 0.05}, {"standard", 0.01}, {"final", 0.001}};
+
+constexpr double kOverFloor = 3;                        // of the reference's own error [-]: what a grade asks for at least
+constexpr double kFinestSeconds = kControlSeconds / 8;  // of the closed loop that choices are held against
+
+/// Share of the work of the most accurate row that a choice saves; -1: nothing was chosen.
+double work_saved(const std::vector<retarget::AccuracyRow>& rows, int choice) {
+  const int finest = retarget::most_accurate(rows);
+  if (choice < 0 || finest < 0) return 0;
+  return 1 - rows[static_cast<std::size_t>(choice)].work_ms / rows[static_cast<std::size_t>(finest)].work_ms;
+}
+
+/// The rows within an error, least work first.
+std::vector<int> by_work(const std::vector<retarget::AccuracyRow>& rows, double most_m) {
+  std::vector<int> order;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (rows[k].stable && rows[k].error_rms_m <= most_m) order.push_back(static_cast<int>(k));
+  }
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return rows[static_cast<std::size_t>(a)].work_ms < rows[static_cast<std::size_t>(b)].work_ms;
+  });
+  return order;
+}
+
+retarget::Replay closed_loop(const retarget::Performer& performer, const retarget::SignalSet& signals,
+                             const retarget::StepSetting& setting) {
+  retarget::ReplayOptions options;
+  take_steps(options, setting);
+  return retarget::perform_briefly(performer, signals, options);
+}
+
+bool is_up(const retarget::Replay& replay) {
+  return !replay.report.fell && replay.termination == physics::Termination::kDone;
+}
+
+/// [m] of the skin; without end where it falls and the finest does not.
+double closed_loop_error(const retarget::Replay& finest, const retarget::Performer& performer,
+                         const retarget::SignalSet& signals, const retarget::StepSetting& setting) {
+  const retarget::Replay replay = closed_loop(performer, signals, setting);
+  if (is_up(finest) && !is_up(replay)) return HUGE_VAL;
+  return retarget::skin_distance(performer, finest.motion, replay.motion);
+}
+
+}  // namespace
+
+double AskedAccuracy::most(const std::string& command) const {
+  return grade.empty() ? parse_share(max_error, command, "--max-error") : kGrades.at(grade);
+}
+
+template <int Dim>
+ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::ReferenceOf<Dim>& reference,
+                       std::optional<physics::Method> only) {
+  const double length = reference.scenario.length, floor = reference.uncertainty_m() / length;
+  double most = asked.most(command);
+  if (asked.grade.empty() && most <= floor) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "the reference itself is only known within %.2g %% of L, so that %.2g %% cannot be told", 100 * floor,
+                  100 * most);
+    throw UsageError(command, "option --max-error", text, "Ask for a larger error.");
+  }
+  if (!asked.grade.empty()) most = std::max(most, kOverFloor * floor);
+  const retarget::StepChoice choice = retarget::choose_setting(reference, most * length, only);
+  ChosenStep chosen;
+  chosen.setting = choice.setting;
+  chosen.report.max_error_length = most;
+  chosen.report.estimated_error_length = choice.estimated_error_m / length;
+  chosen.curve.subject = "this body";
+  chosen.curve.truth = "Errors are distances to '" + physics::name_of(reference.setting.method) + "' in much shorter steps.";
+  chosen.curve.rows = choice.tried;
+  chosen.curve.recommended =
+      choice.is_met ? retarget::cheapest_within(choice.tried, most * length - reference.uncertainty_m()) : -1;
+  chosen.curve.max_error = most;
+  chosen.curve.floor = floor;
+  chosen.report.work_saved = work_saved(choice.tried, chosen.curve.recommended);
+  return chosen;
+}
+
+ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::Performer& performer,
+                       const retarget::SignalSet& signals, std::optional<physics::Method> only) {
+  retarget::AccuracyOptions options;
+  options.step_frame_s = kControlSeconds;
+  const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options);
+  ChosenStep chosen = choose_step(asked, command, reference, only);
+  if (!chosen.report.is_met()) return chosen;
+  const retarget::StepSetting finest{reference.setting.method, kFinestSeconds};
+  chosen.finest = closed_loop(performer, signals, finest);
+  const double most_m = chosen.report.max_error_length * performer.length - reference.uncertainty_m();
+  std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
+  rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
+  const int last = static_cast<int>(rows.size()) - 1;
+  chosen.setting = finest;  // where nothing cheaper will do
+  chosen.curve.recommended = last;
+  double error_m = rows.back().error_rms_m;
+  for (const int k : by_work(rows, most_m)) {
+    if (k == last) break;
+    const retarget::AccuracyRow& row = rows[static_cast<std::size_t>(k)];
+    const retarget::StepSetting setting{*physics::method_named(row.method), row.dt_s};
+    const double found_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, signals, setting));
+    if (found_m > most_m) continue;
+    chosen.setting = setting;
+    chosen.curve.recommended = k;
+    error_m = found_m;
+    break;
+  }
+  chosen.report.estimated_error_length = (error_m + reference.uncertainty_m()) / performer.length;
+  chosen.report.work_saved = 1 - rows[static_cast<std::size_t>(chosen.curve.recommended)].work_ms / rows.back().work_ms;
+  chosen.reference = reference;
+  return chosen;
+}
+
+template ChosenStep choose_step<2>(const AskedAccuracy&, const std::string&, const retarget::ReferenceOf<2>&,
+                                   std::optional<physics::Method>);
+template ChosenStep choose_step<3>(const AskedAccuracy&, const std::string&, const retarget::ReferenceOf<3>&,
+                                   std::optional<physics::Method>);
+
+void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting) {
+  options.method = setting.method;
+  options.steps_per_control = std::max(1, static_cast<int>(std::lround(kControlSeconds / setting.dt_s)));
+  options.step_s = kControlSeconds / options.steps_per_control;
+}
+
+void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, retarget::SignalSet& signals) {
+  constexpr int kLeast = 4;
+  const int all = signals.activation.harmonics();
+  for (retarget::AccuracyRow& row : chosen.curve.rows) row.harmonics = all;
+  if (!chosen.report.is_met() || !chosen.finest) return;
+  const double room = (chosen.report.max_error_length - chosen.curve.floor) * performer.length;
+  int kept = all;
+  for (const double part : {0.75, 0.5, 0.25}) {
+    const int harmonics = std::max(kLeast, static_cast<int>(std::lround(part * all)));
+    if (harmonics >= kept) break;
+    retarget::AccuracyRow row = retarget::measure_error(
+        *chosen.reference, retarget::performed_scenario(performer, signals, harmonics), chosen.setting);
+    row.harmonics = harmonics;
+    chosen.curve.rows.push_back(row);
+    if (!row.stable || row.error_rms_m > room) break;
+    const retarget::SignalSet fewer = retarget::with_harmonics(signals, harmonics);
+    const double error_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, fewer, chosen.setting));
+    if (error_m > room) break;
+    kept = harmonics;
+    chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
+    chosen.report.estimated_error_length = error_m / performer.length + chosen.curve.floor;
+  }
+  if (kept < all) signals = retarget::with_harmonics(signals, kept);
+}
+
+retarget::AccuracyReport told(const ChosenStep& chosen) {
+  retarget::AccuracyReport report = chosen.report;
+  report.method = physics::name_of(chosen.setting.method);
+  report.dt_s = chosen.setting.dt_s;
+  return report;
+}
+
+void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve) {
+  writer.write("accuracy.csv", io::accuracy_csv(curve));
+  writer.write("accuracy.svg", io::accuracy_svg(curve));
+}
+
+std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report) {
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "no setting that was tried stays within %.3g %% of L; '%s' with steps of %.3g s, the nearest, has %.3g %%",
+                100 * report.max_error_length, report.method.c_str(), report.dt_s, 100 * report.estimated_error_length);
+  return one_line({where, "accuracy", text, "Ask for a larger --max-error or let --method be auto"});
+}
+
+void add_accuracy_options(CLI::App& app, AskedAccuracy& asked) {
+  CLI::Option* most = app.add_option(
+      "--max-error", asked.max_error,
+      "1% or 0.01 of L: the cheapest method and step are taken that stay within it, as measured on this body");
+  app.add_option("--accuracy", asked.grade, "draft, standard or final: --max-error 5%, 1% or 0.1%")
+      ->check(CLI::IsMember({"draft", "standard", "final"}))
+      ->excludes(most);
+}
+
+}  // namespace hydrostat::cli

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "io/accuracy_page.h"
+#include "io/creature_directory.h"
+#include "retarget/performance.h"
+
+namespace hydrostat::cli {
+
+/// What --max-error and --accuracy ask for.
+struct AskedAccuracy {
+  std::string max_error, grade;  // "1%"; "draft", "standard" or "final"; empty: nothing was asked for
+
+  bool is_asked() const { return !max_error.empty() || !grade.empty(); }
+  /// [per L]
+  double most(const std::string& command) const;
+};
+
+/// The setting that an accuracy asks for, and what the report tells of it.
+struct ChosenStep {
+  retarget::StepSetting setting;
+  retarget::AccuracyReport report;
+  io::AccuracyCurve curve;                            // of what was tried, the chosen one marked
+  std::optional<retarget::ReferenceOf<3>> reference;  // of a creature
+  std::optional<retarget::Replay> finest;             // likewise: its closed loop in steps finer than any choice
+};
+/// A creature's steps are whole parts of it.
+constexpr double kControlSeconds = 1.0 / 120;
+/// Throws UsageError, in the name of a command, for an error below what the reference can show; a grade is then as near as
+/// that.
+template <int Dim>
+ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::ReferenceOf<Dim>& reference,
+                       std::optional<physics::Method> only);
+
+/// Of a creature: what keeps its open loop near in short windows that start from its target, and then its closed loop, which
+/// has to stay up where the finest does.
+ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::Performer& performer,
+                       const retarget::SignalSet& signals, std::optional<physics::Method> only);
+
+/// Steps of a replay, whose control takes kControlSeconds.
+void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting);
+/// What a report tells of an accuracy, with what was chosen.
+retarget::AccuracyReport told(const ChosenStep& chosen);
+
+/// accuracy.csv and accuracy.svg of what was tried.
+void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve);
+
+/// Cuts a creature's signals to as few harmonics as leave both loops within the error that was asked for; the rows that were
+/// tried join the curve.
+void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, retarget::SignalSet& signals);
+
+/// The line that tells of an error above what was asked for.
+std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report);
+
+/// Adds both options; they exclude each other.
+void add_accuracy_options(CLI::App& app, AskedAccuracy& asked);
+
+}  // namespace hydrostat::cli

@@ -1,0 +1,14 @@
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace hydrostat::cli {
+
+// Each adds one measurement to 'hydrostat bench', in the file of its name.
+void add_bench_accuracy(CLI::App& bench, int& exit_code);
+void add_bench_effects(CLI::App& bench, int& exit_code);
+void add_bench_scaling(CLI::App& bench, int& exit_code);
+
+}  // namespace hydrostat::cli

@@ -1,0 +1,254 @@
+#include "io/accuracy_page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace hydrostat::io {
+
+using retarget::AccuracyRow;
+
+namespace {
+
+// Layout of the diagram [px].
+constexpr double kWidth = 760, kHeight = 470, kLeft = 70, kRight = 150, kTop = 62, kBottom = 50;
+
+std::string number(double value, int digits = 3) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char letter : text) {
+    if (letter == '<')
+      result += "&lt;";
+    else if (letter == '&')
+      result += "&amp;";
+    else if (letter == '"')
+      result += "&quot;";
+    else
+      result += letter;
+  }
+  return result;
+}
+
+std::string percent(double share) { return number(100 * share) + " %"; }
+
+const char* colour_of(const std::string& method) {
+  if (method == "explicit") return "#1f6fb4";
+  if (method == "implicit") return "#d2691e";
+  if (method == "euler") return "#3a3";
+  if (method == "xpbd") return "#a3c";
+  return "#888";
+}
+
+std::string name_of(const AccuracyRow& row) {
+  std::string name =
+      row.method + ", " + std::to_string(row.nodes) + " nodes, " + row.element + ", step " + number(1000 * row.dt_s) + " ms";
+  if (row.harmonics > 0) name += ", " + std::to_string(row.harmonics) + " harmonics";
+  return name;
+}
+
+/// A logarithmic axis over whole decades.
+struct Axis {
+  double low = 1e300, high = -1e300, from, to;  // decades; pixels
+
+  Axis(double from_px, double to_px) : from(from_px), to(to_px) {}
+  void hold(double value) {
+    if (!(value > 0) || !std::isfinite(value)) return;
+    low = std::min(low, std::floor(std::log10(value)));
+    high = std::max(high, std::ceil(std::log10(value)));
+  }
+  void finish() {
+    if (high < low) low = high = 0;
+    if (high - low < 1) high = low + 1;
+  }
+  double at(double value) const {
+    const double decade = value > 0 ? std::log10(value) : low;
+    return from + (std::clamp(decade, low, high) - low) / (high - low) * (to - from);
+  }
+};
+
+std::string grid(const Axis& x, const Axis& y) {
+  std::string svg;
+  for (double d = x.low; d <= x.high + 0.5; ++d) {
+    const std::string at = number(x.at(std::pow(10, d)), 5);
+    svg += "<line x1=\"" + at + "\" x2=\"" + at + "\" y1=\"" + number(kTop) + "\" y2=\"" + number(kHeight - kBottom) +
+           "\" stroke=\"#ddd\"/><text x=\"" + at + "\" y=\"" + number(kHeight - kBottom + 16) +
+           "\" text-anchor=\"middle\">" + number(std::pow(10, d), 7) + "</text>\n";
+  }
+  for (double d = y.low; d <= y.high + 0.5; ++d) {
+    const std::string at = number(y.at(std::pow(10, d)), 5);
+    svg += "<line x1=\"" + number(kLeft) + "\" x2=\"" + number(kWidth - kRight) + "\" y1=\"" + at + "\" y2=\"" + at +
+           "\" stroke=\"#ddd\"/><text x=\"" + number(kLeft - 6) + "\" y=\"" + number(y.at(std::pow(10, d)) + 4, 5) +
+           "\" text-anchor=\"end\">" + number(100 * std::pow(10, d), 7) + " %</text>\n";
+  }
+  svg += "<text x=\"" + number((kLeft + kWidth - kRight) / 2) + "\" y=\"" + number(kHeight - 12) +
+         "\" text-anchor=\"middle\">processor time [ms for a simulated second]</text>\n";
+  svg += "<text transform=\"translate(16 " + number((kTop + kHeight - kBottom) / 2) +
+         ") rotate(-90)\" text-anchor=\"middle\">error [% of L, RMS over the skin]</text>\n";
+  return svg;
+}
+
+std::string sentence(const AccuracyCurve& curve) {
+  if (curve.recommended < 0) return "No setting stays within " + percent(curve.max_error) + " of L.";
+  const AccuracyRow& row = curve.rows[static_cast<std::size_t>(curve.recommended)];
+  return "Ringed: the least work within " + percent(curve.max_error) + " of L: " + name_of(row) + ".";
+}
+
+std::string table(const AccuracyCurve& curve, const std::vector<bool>& front) {
+  std::string html =
+      "<table><tr><th>method<th>element<th>nodes<th>step [ms]<th>iterations a step<th>harmonics<th>error [m]<th>error [% "
+      "L]<th>ms a "
+      "second<th>counted [ms]<th>volume's error [%]<th>momentum unexplained [m g]<th>angular [m g "
+      "L]<th>stable<th>front</tr>\n";
+  for (std::size_t k = 0; k < curve.rows.size(); ++k) {
+    const AccuracyRow& row = curve.rows[k];
+    html += "<tr id=\"row" + std::to_string(k) + "\"" +
+            (static_cast<int>(k) == curve.recommended ? " class=\"chosen\"" : "") + "><td>" + row.method + "<td>" +
+            row.element + "<td>" + std::to_string(row.nodes) + "<td>" + number(1000 * row.dt_s) + "<td>" +
+            number(row.iterations) + "<td>" + (row.harmonics > 0 ? std::to_string(row.harmonics) : "-");
+    for (const double value : {row.error_rms_m, 100 * row.error_rel_length, row.ms_per_sim_s, row.work_ms,
+                               100 * row.volume_error, row.momentum_error, row.angular_error}) {
+      html += "<td>" + (std::isfinite(value) ? number(value) : std::string("-"));
+    }
+    html += std::string("<td>") + (row.stable ? "yes" : "no") + "<td>" + (front[k] ? "yes" : "") + "</tr>\n";
+  }
+  return html + "</table>\n";
+}
+
+}  // namespace
+
+std::string accuracy_csv(const AccuracyCurve& curve) {
+  std::string csv =
+      "method,element,nodes,dt_s,iterations,harmonics,error_rms_m,error_rel_length,ms_per_sim_s,volume_error,momentum_error,"
+      "angular_error,stable\n";
+  for (const AccuracyRow& row : curve.rows) {
+    csv += row.method + "," + row.element + "," + std::to_string(row.nodes) + "," + number(row.dt_s, 9) + "," +
+           number(row.iterations, 6) + "," + std::to_string(row.harmonics);
+    for (const double value : {row.error_rms_m, row.error_rel_length, row.ms_per_sim_s, row.volume_error, row.momentum_error,
+                               row.angular_error}) {
+      csv += "," + number(value, 6);
+    }
+    csv += row.stable ? ",1\n" : ",0\n";
+  }
+  return csv;
+}
+
+namespace {
+
+/// `has_links`: every point leads to `#row<n>`.
+std::string diagram(const AccuracyCurve& curve, bool has_links) {
+  Axis x(kLeft, kWidth - kRight), y(kHeight - kBottom, kTop);
+  for (const AccuracyRow& row : curve.rows) {
+    if (!row.stable) continue;
+    x.hold(row.ms_per_sim_s);
+    y.hold(std::max(row.error_rel_length, 0.1 * curve.floor));
+  }
+  x.finish();
+  y.finish();
+  std::string svg =
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + number(kWidth) + " " + number(kHeight) +
+      "\" role=\"img\" font-family=\"sans-serif\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" "
+      "fill=\"#fff\"/>\n<text x=\"" +
+      number(kLeft) + "\" y=\"20\" font-size=\"14\" font-weight=\"bold\">What accuracy costs: " + escaped(curve.subject) +
+      "</text>\n<text x=\"" + number(kLeft) + "\" y=\"38\">" + escaped(sentence(curve)) + "</text>\n<text x=\"" +
+      number(kLeft) + "\" y=\"53\">Down and to the left is better; the line joins what nothing beats in both.</text>\n";
+  svg += grid(x, y);
+  if (curve.floor > 0) {
+    svg += "<line x1=\"" + number(kLeft) + "\" x2=\"" + number(kWidth - kRight) + "\" y1=\"" + number(y.at(curve.floor), 5) +
+           "\" y2=\"" + number(y.at(curve.floor), 5) + "\" stroke=\"#c33\" stroke-dasharray=\"4 3\"/><text x=\"" +
+           number(kWidth - kRight + 4) + "\" y=\"" + number(y.at(curve.floor) + 4, 5) +
+           "\" fill=\"#c33\">the reference's own</text>\n";
+  }
+  const std::vector<bool> front = retarget::pareto_front(curve.rows);
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < curve.rows.size(); ++k) {
+    if (front[k]) order.push_back(k);
+  }
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return curve.rows[a].ms_per_sim_s < curve.rows[b].ms_per_sim_s; });
+  std::string line;
+  for (const std::size_t k : order) {
+    line += number(x.at(curve.rows[k].ms_per_sim_s), 5) + "," + number(y.at(curve.rows[k].error_rel_length), 5) + " ";
+  }
+  svg += "<polyline fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.5\" points=\"" + line + "\"/>\n";
+  std::vector<std::string> methods;
+  for (std::size_t k = 0; k < curve.rows.size(); ++k) {
+    const AccuracyRow& row = curve.rows[k];
+    if (!row.stable) continue;
+    if (std::find(methods.begin(), methods.end(), row.method) == methods.end()) methods.push_back(row.method);
+    const std::string at =
+        "cx=\"" + number(x.at(row.ms_per_sim_s), 5) + "\" cy=\"" + number(y.at(row.error_rel_length), 5) + "\"";
+    svg += (has_links ? "<a href=\"#row" + std::to_string(k) + "\">" : std::string("<g>")) + "<title>" +
+           escaped(name_of(row)) + ": " + percent(row.error_rel_length) + " of L, " + number(row.ms_per_sim_s) +
+           " ms a second</title>";
+    if (static_cast<int>(k) == curve.recommended)
+      svg += "<circle " + at + " r=\"10\" fill=\"none\" stroke=\"#000\" stroke-width=\"2\"/>";
+    const bool is_box = row.element == "hex" || row.element == "quad";
+    svg += "<circle " + at + " r=\"" + (front[k] ? "5" : "4") + "\" stroke=\"" + colour_of(row.method) +
+           "\" stroke-width=\"1.5\" fill=\"" + (is_box ? "#fff" : colour_of(row.method)) + "\" fill-opacity=\"" +
+           (front[k] ? "1" : "0.5") + "\"/>" + (has_links ? "</a>\n" : "</g>\n");
+  }
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    svg += "<text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" + number(kTop + 14 + 16 * static_cast<double>(m)) +
+           "\" fill=\"" + colour_of(methods[m]) + "\">&#9679; " + methods[m] + "</text>\n";
+  }
+  return svg + "</svg>\n";
+}
+
+}  // namespace
+
+std::string accuracy_svg(const AccuracyCurve& curve) { return diagram(curve, false); }
+
+std::string accuracy_page(const AccuracyCurve& curve) {
+  std::string html =
+      "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Accuracy against "
+      "time</title>\n<style>body{font:14px "
+      "sans-serif;max-width:1180px;margin:2em auto;padding:0 "
+      "1em}svg{width:900px;max-width:100%}table{border-collapse:collapse}"
+      "th,td{border:1px solid #ccc;padding:.25em "
+      ".5em;text-align:right}tr:target{background:#fe9}.chosen{font-weight:bold}a{cursor:"
+      "pointer}</style>\n<h1>Accuracy against time: " +
+      escaped(curve.subject) + "</h1>\n<p>" + escaped(curve.truth) + " No error below " + percent(curve.floor) +
+      " of L can be told by it. A click on a point leads to its row; empty points are of hexahedra or quads. Choices go by "
+      "counted work, which "
+      "is the same on every machine; the picture shows this machine's processor time.</p>\n";
+  return html + diagram(curve, true) + table(curve, retarget::pareto_front(curve.rows)) + "</html>\n";
+}
+
+std::string accuracy_json(const AccuracyCurve& curve) {
+  nlohmann::ordered_json json;
+  json["schema"] = "hydrostat.accuracy/1";
+  json["subject"] = curve.subject;
+  json["truth"] = curve.truth;
+  json["max_error"] = curve.max_error;
+  json["floor"] = curve.floor;
+  json["recommended"] = curve.recommended;
+  json["rows"] = nlohmann::ordered_json::array();
+  const std::vector<bool> front = retarget::pareto_front(curve.rows);
+  for (std::size_t k = 0; k < curve.rows.size(); ++k) {
+    const AccuracyRow& row = curve.rows[k];
+    json["rows"].push_back({{"method", row.method},
+                            {"element", row.element},
+                            {"nodes", row.nodes},
+                            {"dt_s", row.dt_s},
+                            {"iterations", row.iterations},
+                            {"harmonics", row.harmonics},
+                            {"error_rms_m", row.error_rms_m},
+                            {"error_rel_length", row.error_rel_length},
+                            {"ms_per_sim_s", row.ms_per_sim_s},
+                            {"work_ms", row.work_ms},
+                            {"volume_error", row.volume_error},
+                            {"momentum_error", row.momentum_error},
+                            {"angular_error", row.angular_error},
+                            {"stable", row.stable},
+                            {"on_front", static_cast<bool>(front[k])}});
+  }
+  return json.dump(1) + "\n";
+}
+
+}  // namespace hydrostat::io

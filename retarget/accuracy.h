@@ -1,0 +1,112 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "retarget/simulation.h"
+
+namespace hydrostat::retarget {
+
+/// How a body is stepped.
+struct StepSetting {
+  physics::Method method = physics::Method::kExplicit;
+  double dt_s = 1.0 / 240;
+};
+
+/// A stretch of a motion that a setting has to repeat from its start.
+template <int Dim>
+struct WindowOf {
+  double begin_s = 0, duration_s = 0;  // a whole number of AccuracyOptions::frame_s
+  physics::StateOf<Dim> start;
+};
+
+struct AccuracyOptions {
+  double duration_s = 1;           // of the motion that is looked at, at most
+  double step_frame_s = 1.0 / 30;  // which steps that are tried fill; fills frame_s
+  double frame_s = 1.0 / 30;       // between the places that are compared: a whole number of every setting's steps
+  double window_s = 0.1;           // with contact, whose paths part in any method
+  int windows = 8;                 // likewise, evenly over the motion
+  int fineness = 4;                // the reference's substeps in one of explicit's own
+};
+
+/// What is to be repeated, as it truly goes: by an accurate method in short steps.
+template <int Dim>
+struct ReferenceOf {
+  ScenarioOf<Dim> scenario;
+  AccuracyOptions options;
+  std::vector<WindowOf<Dim>> windows;          // one, of the whole motion, where nothing touches
+  physics::ContactPointsOf<Dim> skin;          // P points of the scenario's body by which motions are compared
+  std::vector<physics::PointsOf<Dim>> places;  // of the skin in every frame of every window [m]
+  StepSetting setting;                         // that it was made by
+  double own_error_m = 0;                      // distance to the same method in steps twice as long
+  StepSetting check;                           // the second method
+  double check_distance_m = 0;                 // to the motion by it
+  double check_error_m = 0;                    // how far that one moves when its steps are halved
+  double work_ms = 0;                          // counted
+
+  /// No error below it can be told [m, RMS]: the reference's own, or, where the second method does not agree within what
+  /// both leave open, its distance.
+  double uncertainty_m() const;
+};
+
+/// Follows the motion from the scenario's start; with contact its windows start on the way. The second method is only asked
+/// where `is_checked`.
+template <int Dim>
+ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options, bool is_checked = true);
+/// The same for windows and skin that are given.
+template <int Dim>
+ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options,
+                                std::vector<WindowOf<Dim>> windows, physics::ContactPointsOf<Dim> skin,
+                                bool is_checked = true);
+
+/// One point of the curve: what a setting costs and how far it is from the truth.
+struct AccuracyRow {
+  std::string method, element;
+  int nodes = 0;
+  double dt_s = 0;
+  double iterations = 0;  // of the solver a step: substeps, Newton's, or those of L-BFGS
+  int harmonics = 0;      // of a creature's signals
+  double error_rms_m = 0, error_rel_length = 0;
+  double ms_per_sim_s = 0;                       // as the clock of this thread has it
+  double work_ms = 0;                            // counted, a simulated second: what choices go by
+  double volume_error = 0;                       // the whole body's, at most
+  double momentum_error = 0, angular_error = 0;  // what booked impulses do not explain: m g, m g L
+  bool stable = true;                            // finite, and no further away than L
+};
+
+/// Repeats the reference's windows. The scenario may hold the same body in another mesh: starts are then carried over.
+template <int Dim>
+AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Dim>& scenario, const StepSetting& setting);
+
+/// Methods and steps that are tried on a body, each method's from long steps to short ones; steps are whole parts of
+/// `frame_s`.
+template <int Dim>
+std::vector<std::vector<StepSetting>> settings_to_try(const physics::SceneOf<Dim>& scene, double frame_s);
+
+/// Which rows no other beats in both error and time [ms_per_sim_s]; of equal ones the first.
+std::vector<bool> pareto_front(const std::vector<AccuracyRow>& rows);
+/// The stable row of least counted work whose error is at most `most_m`; none: -1.
+int cheapest_within(const std::vector<AccuracyRow>& rows, double most_m);
+/// The stable row of least error; none: -1.
+int most_accurate(const std::vector<AccuracyRow>& rows);
+
+/// The cheapest setting by counted work whose error stays within a bound, measured on this very body.
+struct StepChoice {
+  StepSetting setting;
+  AccuracyRow row;
+  bool is_met = false;           // false: the setting is the most accurate one that was found
+  double estimated_error_m = 0;  // the row's, and what the reference leaves open
+  std::vector<AccuracyRow> tried;
+};
+/// `only`: no other method is tried.
+template <int Dim>
+StepChoice choose_setting(const ReferenceOf<Dim>& reference, double most_m, std::optional<physics::Method> only);
+
+/// The error of a setting [per L, RMS over the skin] where no bound was asked for, from few runs: its distance to the same
+/// method in half steps, doubled, or to an accurate method where its own limit is another body (xpbd, spring) or far
+/// (euler).
+template <int Dim>
+double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
+
+}  // namespace hydrostat::retarget

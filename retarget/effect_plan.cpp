@@ -1,0 +1,194 @@
+#include "retarget/effect_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace hydrostat::retarget {
+namespace {
+
+using physics::VectorOf;
+
+constexpr double kExtent = 2;  // of L [-]: no part of a body that nothing holds is farther from its centre of mass
+constexpr double kLeastResistance = 0.005;  // of the weight [-]: less is not seen
+constexpr double kGravity = 9.81;           // [m/s2] of the weight where there is none
+
+std::string number(double value, int digits = 2) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+std::string many(std::size_t count, const char* one) { return std::to_string(count) + " " + one + (count == 1 ? "" : "s"); }
+
+/// One scenario's effects, asked one after the other.
+template <int Dim>
+class Planner {
+ public:
+  Planner(const std::map<std::string, Wish>& wishes, ScenarioOf<Dim>& scenario)
+      : wishes_(wishes),
+        scenario_(scenario),
+        scene_(scenario.scene),
+        centre_(physics::centre_of_mass(scene_.body, scenario.start.x)),
+        velocity_(physics::momentum(scene_.body, scenario.start.v) / scene_.body.mass.sum()) {}
+
+  std::string plan() {
+    const bool has_gravity = scene_.gravity.norm() > 0;
+    decide("gravity", has_gravity, has_gravity, number(scene_.gravity.norm(), 3) + " m/s2", "the scene has none");
+    if (!is_on("gravity")) scene_.gravity.setZero();
+    decide_surroundings();
+    decide_fluids();
+    const bool rubs = scene_.ground.friction > 0 || std::any_of(scene_.obstacles.begin(), scene_.obstacles.end(),
+                                                                [](const auto& o) { return o.friction > 0; });
+    const bool touches = is_on("ground") || is_on("obstacles");
+    decide("friction", touches, touches && rubs, "what the body touches rubs",
+           touches ? "nothing rubs" : "there is nothing to rub against");
+    if (!is_on("friction")) {
+      scene_.ground.friction = 0;
+      for (auto& obstacle : scene_.obstacles) obstacle.friction = 0;
+    }
+    decide_body();
+    decide("pushes", !scenario_.pushes.empty(), !scenario_.pushes.empty(),
+           std::to_string(scenario_.pushes.size()) + " in the scene", "the scene has none");
+    if (!is_on("pushes")) scenario_.pushes.clear();
+    return broken_;
+  }
+
+ private:
+  Wish wish_for(const std::string& name) const {
+    const auto found = wishes_.find(name);
+    return found == wishes_.end() ? Wish::kAuto : found->second;
+  }
+
+  bool is_on(const std::string& name) const {
+    return std::any_of(scenario_.decisions.begin(), scenario_.decisions.end(),
+                       [&](const EffectDecision& d) { return d.name == name && d.is_on; });
+  }
+
+  /// `can_be`: the scene has what it needs; `is_wanted`: by itself it is on.
+  void decide(const std::string& name, bool can_be, bool is_wanted, const std::string& why, const std::string& why_not) {
+    EffectDecision decision{name, is_wanted, is_wanted ? why : why_not};
+    switch (wish_for(name)) {
+      case Wish::kAuto:
+        break;
+      case Wish::kOn:
+        if (!can_be && broken_.empty()) broken_ = "'" + name + "' is asked for, but " + why_not;
+        decision.is_on = can_be;
+        decision.reason = "asked for by the scene";
+        break;
+      case Wish::kOff:
+        decision.is_on = false;
+        decision.reason = "turned off by the scene";
+        break;
+    }
+    scenario_.decisions.push_back(std::move(decision));
+  }
+
+  /// Something other than the body's own weight and speed may bring it anywhere.
+  bool is_led() const { return !scenario_.clamps.empty() || !scenario_.pushes.empty() || scene_.water || scene_.air; }
+
+  /// Whether the body, in free flight for ever, comes to where normal . x is below offset.
+  bool can_sink_below(const VectorOf<Dim>& normal, double offset) const {
+    if (is_led()) return true;
+    const double height = normal.dot(centre_) - offset - kExtent * scenario_.length, speed = normal.dot(velocity_),
+                 pull = normal.dot(scene_.gravity);
+    if (height <= 0 || pull < 0 || (pull == 0 && speed < 0)) return true;
+    return pull > 0 && speed < 0 && speed * speed / (2 * pull) >= height;  // where it turns around
+  }
+
+  void decide_surroundings() {
+    const bool reached = scene_.has_ground && can_sink_below(scene_.ground.normal, scene_.ground.offset);
+    decide("ground", scene_.has_ground, reached, "the body stands, lands or can land on it",
+           scene_.has_ground ? "nothing can bring the body there" : "the scene has none");
+    scene_.has_ground = is_on("ground");
+    const bool has_any = !scene_.obstacles.empty();
+    bool near = is_led() || !scenario_.moves.empty() || scene_.gravity.norm() > 0 || velocity_.norm() > 0;
+    for (const physics::ObstacleOf<Dim>& obstacle : scene_.obstacles) {
+      near = near || physics::distance_at_least<Dim>(obstacle, VectorOf<Dim>::Zero(), centre_) <= kExtent * scenario_.length;
+    }
+    decide("obstacles", has_any, has_any && near, many(scene_.obstacles.size(), "obstacle") + " in the scene",
+           has_any ? "nothing can bring the body there" : "the scene has none");
+    if (!is_on("obstacles")) {
+      scene_.obstacles.clear();
+      scenario_.moves.clear();
+      scenario_.start.obstacle_travel.resize(Dim, 0);
+    }
+  }
+
+  void decide_fluids() {
+    std::string why = "it is everywhere", why_not = "there is no water";
+    bool reached = scene_.water.has_value();
+    if (scene_.water && std::isfinite(scene_.water->level)) {
+      const bool is_wet = scenario_.start.x.row(1).minCoeff() < scene_.water->level;
+      const bool falls = scene_.gravity.norm() > 0 || velocity_.norm() > 0 || !scenario_.pushes.empty();
+      reached = is_wet || falls;
+      why = is_wet ? "the body starts in it" : "the body can fall into it";
+      why_not = "nothing can bring the body to its surface";
+    }
+    decide("water", scene_.water.has_value(), reached, why, why_not);
+    if (!is_on("water")) scene_.water.reset();
+
+    const bool was_given = scene_.air.has_value();
+    if (!was_given) scene_.air.emplace().density = 1.2;
+    const double share = resistance_share();
+    const std::string text = "at its fastest it would be " + number(100 * share) + " % of the weight";
+    const bool is_deep = scene_.water && !std::isfinite(scene_.water->level);
+    decide("air_drag", !is_deep, was_given && !is_deep && share >= kLeastResistance, text,
+           is_deep     ? "there is water everywhere"
+           : was_given ? text
+                       : "the scene tells of no air; " + text);
+    if (!is_on("air_drag")) scene_.air.reset();
+  }
+
+  /// Of the air, at the speed that start, wind, pushes and a fall to the ground or of ten lengths give, to the weight.
+  double resistance_share() const {
+    double speed_squared = (scenario_.start.v.colwise() - scene_.air->velocity).colwise().squaredNorm().maxCoeff();
+    const double fall =
+        scene_.has_ground ? std::max(0.0, scene_.ground.normal.dot(centre_) - scene_.ground.offset) : 10 * scenario_.length;
+    speed_squared += 2 * scene_.gravity.norm() * fall;
+    for (const PushOf<Dim>& push : scenario_.pushes) speed_squared += push.delta_v.squaredNorm();
+    const VectorOf<Dim> extent = scene_.body.rest.rowwise().maxCoeff() - scene_.body.rest.rowwise().minCoeff();
+    const double area = Dim == 3 ? extent.prod() / extent.minCoeff() : extent.maxCoeff();
+    return 0.5 * scene_.air->density * scene_.air->drag * area * speed_squared / (kGravity * scene_.body.mass.sum());
+  }
+
+  void decide_body() {
+    physics::BodyOf<Dim>& body = scene_.body;
+    const bool has_springs = body.volume_stiffness.size() > 0;
+    if (!has_springs && wish_for("volume") == Wish::kOff && broken_.empty()) {
+      broken_ = "'volume' cannot be off, for it is a part of the elements' law";
+    }
+    decide("volume", true, true,
+           has_springs ? "every element keeps its volume by a spring"
+                       : "a part of the elements' law, as far as Poisson's ratio says; counted there",
+           "");
+    if (!is_on("volume")) body.volume_stiffness.resize(0);
+    const bool has_dashpots = body.edge_damping.size() > 0 && body.edge_damping.maxCoeff() > 0;
+    decide("damping", has_dashpots, has_dashpots, "a dashpot along every constraint", "damping_time_s is 0");
+    if (!is_on("damping")) body.edge_damping.setZero();
+  }
+
+  const std::map<std::string, Wish>& wishes_;
+  ScenarioOf<Dim>& scenario_;
+  physics::SceneOf<Dim>& scene_;
+  const VectorOf<Dim> centre_, velocity_;
+  std::string broken_;
+};
+
+}  // namespace
+
+const std::vector<std::string>& switchable_effects() {
+  static const std::vector<std::string> names{"gravity", "ground",   "friction", "obstacles", "volume",
+                                              "damping", "air_drag", "water",    "pushes"};
+  return names;
+}
+
+template <int Dim>
+std::string plan_effects(const std::map<std::string, Wish>& wishes, ScenarioOf<Dim>& scenario) {
+  scenario.decisions.clear();
+  return Planner<Dim>(wishes, scenario).plan();
+}
+template std::string plan_effects<2>(const std::map<std::string, Wish>&, ScenarioOf<2>&);
+template std::string plan_effects<3>(const std::map<std::string, Wish>&, ScenarioOf<3>&);
+
+}  // namespace hydrostat::retarget

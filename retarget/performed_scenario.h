@@ -1,0 +1,27 @@
+#pragma once
+
+#include "retarget/accuracy.h"
+#include "retarget/performance.h"
+
+namespace hydrostat::retarget {
+
+/// The same with fewer harmonics of activations and forces.
+SignalSet with_harmonics(const SignalSet& signals, int harmonics);
+
+/// The open loop of a creature as a scenario: its body let go at the target's start, driven by its signals, of which
+/// `harmonics` are kept (0: all). Performer and signals are copied.
+ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& signals, int harmonics = 0);
+
+/// Its motion in short windows that start from the prepared target, evenly over one period or, played once, its length: the
+/// open loop's own path leaves it soon in any method.
+ReferenceOf<3> performed_reference(const Performer& performer, const SignalSet& signals, const AccuracyOptions& options,
+                                   bool is_checked = true);
+
+/// The closed loop from the start of the target, for two periods, 2 to 4 s. Small errors of a window may add up to a fall:
+/// here they show.
+Replay perform_briefly(const Performer& performer, const SignalSet& signals, const ReplayOptions& options);
+
+/// Between two replays of a creature [m, RMS over the skin's vertices and the frames that both have].
+double skin_distance(const Performer& performer, const Motion& a, const Motion& b);
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "physics/stepper.h"
+
+namespace hydrostat::retarget {
+
+/// What work on a scene's body is worth [ms]: counts times a table of constants (step_cost.cpp), so that a choice by it
+/// hangs on the scene alone, never on the clock. Effects and contact are not in it: every method has the same.
+template <int Dim>
+double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, const physics::StepWork& work);
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,138 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/cli/run_program.h"
+#include "tests/sanitizers.h"
+
+namespace hydrostat::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char* const kFalling =
+    "dimension = 2\nduration_s = 0.4\n[body]\nshape = \"bar\"\nsize_m = [0.6, 0.2]\nposition_m = [0.0, 0.15]\nnodes = "
+    "12\nrotation_deg = "
+    "10.0\n[ground]\n";
+
+class AccuracyCommands : public testing::Test {
+ protected:
+  AccuracyCommands() { io::write_file(directory.path / "scene.toml", kFalling); }
+  Outcome run(const std::string& arguments) const { return hydrostat_in(directory.path, arguments); }
+  nlohmann::json report(const std::string& out) const {
+    return nlohmann::json::parse(io::read_file(directory.path / out / "report.json"));
+  }
+  TemporaryDirectory directory;
+};
+
+TEST_F(AccuracyCommands, BenchWritesTheCurve) {
+  const Outcome outcome = run("bench accuracy scene.toml -o out --own-mesh --duration 0.2 --json --quiet");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["schema"], "hydrostat.accuracy/1");
+  const std::string csv = io::read_file(directory.path / "out" / "accuracy.csv");
+  EXPECT_EQ(
+      csv.substr(0, csv.find('\n')),
+      "method,element,nodes,dt_s,iterations,harmonics,error_rms_m,error_rel_length,ms_per_sim_s,volume_error,momentum_error,"
+      "angular_error,stable");
+  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), json["rows"].size() + 1);
+  const std::string page = io::read_file(directory.path / "out" / "accuracy.html");
+  for (std::size_t k = 0; k < json["rows"].size(); ++k) {  // each point that is drawn leads to its row
+    if (!json["rows"][k]["stable"]) continue;
+    EXPECT_NE(page.find("href=\"#row" + std::to_string(k) + "\""), std::string::npos);
+    EXPECT_NE(page.find("id=\"row" + std::to_string(k) + "\""), std::string::npos);
+  }
+  const int chosen = json["recommended"];
+  ASSERT_GE(chosen, 0);
+  const auto& best = json["rows"][static_cast<std::size_t>(chosen)];
+  EXPECT_LE(best["error_rel_length"], json["max_error"]);
+  for (const auto& row : json["rows"]) {
+    if (row["stable"] && row["error_rel_length"] <= json["max_error"]) {
+      EXPECT_GE(row["work_ms"], best["work_ms"]);
+    }
+  }
+}
+
+TEST_F(AccuracyCommands, SimulateTakesTheCheapestWithinTheErrorAndTellsIt) {
+  ASSERT_EQ(run("simulate scene.toml -o fine --max-error 0.5% --quiet").exit_code, 0);
+  ASSERT_EQ(run("simulate scene.toml -o draft --accuracy draft --quiet").exit_code, 0);
+  const auto fine = report("fine")["accuracy"], draft = report("draft")["accuracy"];
+  EXPECT_LE(fine["estimated_error_length"], 0.005);
+  EXPECT_LE(draft["estimated_error_length"], 0.05);
+  EXPECT_EQ(fine["max_error_length"], 0.005);
+  EXPECT_GE(draft["work_saved"], fine["work_saved"]);
+  EXPECT_TRUE(fs::exists(directory.path / "fine" / "accuracy.svg"));
+  EXPECT_NE(io::read_file(directory.path / "fine" / "report.html").find("What accuracy costs: "), std::string::npos);
+  ASSERT_EQ(run("simulate scene.toml -o again --max-error 0.5% --quiet").exit_code, 0);
+  EXPECT_EQ(report("again")["accuracy"]["method"], fine["method"]);
+  EXPECT_EQ(report("again")["accuracy"]["dt_s"], fine["dt_s"]);
+}
+
+TEST_F(AccuracyCommands, RefuseWhatCannotBeToldAndTellWhatIsPossible) {
+  const Outcome too_small = run("simulate scene.toml -o out --max-error 0.00001% --quiet");
+  EXPECT_EQ(too_small.exit_code, 2);
+  EXPECT_NE(too_small.err.find("the reference itself is only known within"), std::string::npos) << too_small.err;
+  EXPECT_FALSE(fs::exists(directory.path / "out"));
+  const Outcome short_of_it = run("simulate scene.toml -o out --method euler --max-error 0.25% --quiet");
+  EXPECT_EQ(short_of_it.exit_code, 3);
+  EXPECT_NE(short_of_it.err.find("no setting that was tried stays within"), std::string::npos) << short_of_it.err;
+  EXPECT_TRUE(fs::exists(directory.path / "out" / "failed.glb"));
+  EXPECT_FALSE(fs::exists(directory.path / "out" / "replay.glb"));
+  EXPECT_GT(report("out")["accuracy"]["estimated_error_length"], 0.0025);
+  EXPECT_EQ(run("simulate scene.toml -o out --max-error 70% --quiet").exit_code, 2);
+  EXPECT_EQ(run("simulate scene.toml -o out --max-error 1% --accuracy draft --quiet").exit_code, 2);
+}
+
+TEST_F(AccuracyCommands, ExplainTellsEveryEffectOnceWithItsReason) {
+  const Outcome outcome = run("explain scene.toml --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto effects = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(effects.size(), 13U);
+  for (const auto& effect : effects) {
+    EXPECT_NE(effect["reason"], "");
+    if (effect["state"] == "off") {
+      EXPECT_EQ(effect["ms_per_sim_s"], 0) << effect["name"];
+    }
+  }
+  EXPECT_EQ(run("bench effects scene.toml -o bench --duration 0.1").exit_code, 0);
+  EXPECT_TRUE(fs::exists(directory.path / "bench" / "effects.html"));
+}
+
+/// Instructions of the steps and of what effects add to them, as valgrind counts them; what is outside allocates, and the
+/// heap is never twice the same.
+double instructions(const fs::path& directory, const std::string& scene) {
+  const std::string command =
+      "cd '" + directory.string() +
+      "' && valgrind --tool=callgrind --callgrind-out-file=counts "
+      "--toggle-collect='*GuardedStepper<*>::step(*' --toggle-collect='*FluidEffect<*>::add_forces(*' "
+      "'" HYDROSTAT_BINARY "' simulate " +
+      scene + " -o out --threads 1 --quiet >log 2>&1";
+  if (std::system(command.c_str()) != 0) return -1;
+  std::istringstream text(io::read_file(directory / "counts"));
+  for (std::string word; text >> word;) {
+    if (word == "summary:" || word == "totals:") return text >> word ? std::stod(word) : -1;
+  }
+  return -1;
+}
+
+TEST_F(AccuracyCommands, AnEffectThatIsOffCostsNoInstruction) {
+  if (kSanitized || std::system("valgrind --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "valgrind is not installed";
+  const std::string shape = "dimension = 2\nduration_s = 0.02\n[body]\nshape = \"square\"\nsize_m = 0.4\nnodes = 9\n";
+  io::write_file(directory.path / "plain.toml", shape);
+  io::write_file(directory.path / "off.toml",
+                 shape + "[water]\n[air]\nvelocity_m_s = [30.0, 0.0]\n[effects]\nwater = \"off\"\nair_drag = \"off\"\n");
+  io::write_file(directory.path / "on.toml", shape + "[water]\n");
+  const double plain = instructions(directory.path, "plain.toml"), off = instructions(directory.path, "off.toml"),
+               on = instructions(directory.path, "on.toml");
+  ASSERT_GT(plain, 1e5);
+  EXPECT_NEAR(off, plain, 1e-3 * plain);
+  EXPECT_GT(on, 1.01 * plain);
+}
+
+}  // namespace
+}  // namespace hydrostat::cli

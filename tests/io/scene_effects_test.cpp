@@ -1,0 +1,164 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "io/scene_file.h"
+#include "io/write_file.h"
+#include "retarget/effect_bench.h"
+#include "retarget/effect_plan.h"
+#include "tests/io/refusal.h"
+#include "tests/io/temporary_directory.h"
+
+namespace hydrostat::io {
+namespace {
+
+using retarget::ScenarioOf;
+
+const std::string kBody = "dimension = 2\n[body]\nshape = \"square\"\nsize_m = 0.4\nnodes = 9\nposition_m = [0.0, 1.0]\n";
+const std::string kWeightless = "gravity_m_s2 = [0.0, 0.0]\n" + kBody;
+
+class SceneEffects : public testing::Test {
+ protected:
+  ScenarioOf<2> scenario(const std::string& text) {
+    write_file(directory.path / "scene.toml", text);
+    return std::get<ScenarioOf<2>>(read_scene_file(directory.path / "scene.toml").scenario);
+  }
+  TemporaryDirectory directory;
+};
+
+bool is_on(const ScenarioOf<2>& scenario, const std::string& name) {
+  if (name == "self_contact") return scenario.scene.self_contact.is_on;
+  for (const retarget::EffectDecision& decision : scenario.decisions) {
+    if (decision.name == name) return decision.is_on;
+  }
+  ADD_FAILURE() << "nobody decided " << name;
+  return false;
+}
+
+TEST_F(SceneEffects, AreOnWhereASceneNeedsThemAndOffWhereNot) {
+  struct Case {
+    std::string text, effect;
+    bool on;
+  };
+  const std::string ground = "[ground]\n", box = "[[obstacle]]\nshape = \"box\"\nsize_m = [0.2, 0.2]\n",
+                    thrown = "velocity_m_s = [0.0, 2.0]\n", sunk = "velocity_m_s = [0.0, -2.0]\n",
+                    wind = "[air]\nvelocity_m_s = [20.0, 0.0]\n";
+  const Case cases[] = {
+      {kBody, "gravity", true},
+      {kWeightless, "gravity", false},
+      {kBody + ground, "ground", true},
+      {kBody, "ground", false},
+      {kWeightless + "[ground]\nheight_m = 0.5\n", "ground", true},  // it begins within two lengths
+      {kWeightless + "[ground]\nheight_m = -9.0\n", "ground", false},
+      {kWeightless + sunk + "[ground]\nheight_m = -9.0\n", "ground", true},
+      {kWeightless + thrown + "[ground]\nheight_m = -9.0\n", "ground", false},
+      {kWeightless + "[ground]\nheight_m = -9.0\n[[push]]\ntime_s = 1.0\ndelta_v_m_s = [0.0, -3.0]\n", "ground", true},
+      {kBody + ground, "friction", true},
+      {kBody + "[ground]\nfriction = 0.0\n", "friction", false},
+      {kBody, "friction", false},
+      {kBody + box, "obstacles", true},
+      {kBody, "obstacles", false},
+      {kWeightless + box + "position_m = [9.0, 0.0]\n", "obstacles", false},
+      {kWeightless + box + "position_m = [9.0, 0.0]\n[[obstacle.move]]\nvelocity_m_s = [-5.0, 0.0]\n", "obstacles", true},
+      {kBody + "[water]\n", "water", true},
+      {kBody, "water", false},
+      {kBody + "[water]\nlevel_m = 0.0\n", "water", true},
+      {kWeightless + "[water]\nlevel_m = 0.0\n", "water", false},
+      {kWeightless + "[water]\nlevel_m = 0.9\n", "water", true},
+      {kBody + ground + "[air]\n", "air_drag", false},
+      {kBody + "[air]\n", "air_drag", true},  // nothing ends its fall
+      {kBody, "air_drag", false},
+      {kBody + wind, "air_drag", true},
+      {kBody + wind + "[water]\n", "air_drag", false},
+      {kBody + "[[push]]\ntime_s = 0.1\ndelta_v_m_s = [1.0, 0.0]\n", "pushes", true},
+      {kBody, "pushes", false},
+      {kBody, "volume", true},
+      {kBody, "damping", true},
+      {kBody + "[material]\ndamping_time_s = 0.0\n", "damping", false},
+      {kBody, "self_contact", false},
+  };
+  for (const Case& one : cases) {
+    SCOPED_TRACE(one.effect + " of\n" + one.text);
+    const ScenarioOf<2> made = scenario(one.text);
+    EXPECT_EQ(is_on(made, one.effect), one.on);
+    for (const retarget::EffectDecision& decision : made.decisions) EXPECT_FALSE(decision.reason.empty()) << decision.name;
+  }
+}
+
+TEST_F(SceneEffects, ThatAreOffAreNotThere) {
+  const std::string all = kBody +
+                          "[ground]\n[water]\n[[obstacle]]\nshape = \"ball\"\nsize_m = 0.2\n[[push]]\ntime_s = "
+                          "0.1\ndelta_v_m_s = [1.0, 0.0]\n[effects]\n";
+  std::string off;
+  for (const std::string& name : retarget::switchable_effects()) off += name + " = \"off\"\n";
+  const ScenarioOf<2> bare = scenario(all + off);
+  EXPECT_FALSE(bare.scene.has_ground || bare.scene.water || bare.scene.air);
+  EXPECT_TRUE(bare.scene.gravity.isZero(0) && bare.scene.obstacles.empty() && bare.pushes.empty());
+  EXPECT_EQ(bare.scene.body.volume_stiffness.size(), 0);
+  EXPECT_EQ(bare.scene.body.edge_damping.maxCoeff(), 0);
+  EXPECT_TRUE(scenario(all + "water = \"on\"\n").scene.water);
+  EXPECT_TRUE(scenario(kBody + "[effects]\nair_drag = \"on\"\n").scene.air);
+}
+
+TEST_F(SceneEffects, ThatContradictEachOtherAreRefused) {
+  for (const std::string& text : {kBody + "[effects]\nwater = \"on\"\n", kBody + "[effects]\nground = \"on\"\n",
+                                  kBody + "[effects]\npushes = \"on\"\n", kBody + "[water]\n[effects]\nair_drag = \"on\"\n",
+                                  kBody + "[effects]\nself_contact = \"off\"\nself_friction = 0.3\n",
+                                  kBody + "[material]\nlaw = \"stable_neo_hookean\"\n[effects]\nvolume = \"off\"\n",
+                                  kBody + "[effects]\nwatter = \"on\"\n"}) {
+    SCOPED_TRACE(text);
+    EXPECT_THROW(scenario(text), Error);
+  }
+}
+
+/// The wave runs back, the body forth; in empty space its middle stays where it is.
+TEST_F(SceneEffects, LetASwimmerSwim) {
+  const SceneFile eel = read_scene_file(std::filesystem::path(HYDROSTAT_SAMPLES) / "scenes" / "swimming_eel.toml");
+  ScenarioOf<2> scenario = std::get<ScenarioOf<2>>(eel.scenario);
+  for (const physics::Method method : {physics::Method::kExplicit, physics::Method::kImplicit}) {
+    SCOPED_TRACE(physics::name_of(method));
+    retarget::SimulationOptions options;
+    options.method = method;
+    options.duration_s = 3;
+    const retarget::Simulation run = retarget::simulate(scenario, options);
+    EXPECT_GT(run.course.com(0, run.course.com.cols() - 1), 0.1);
+    EXPECT_LT(run.report.momentum_residual_mg, 1e-6);  // all that the water does is booked
+    EXPECT_LT(run.report.angular_residual_mgl, 1e-4);
+  }
+  scenario.scene.water.reset();
+  retarget::SimulationOptions options;
+  options.duration_s = 1;
+  EXPECT_LT(retarget::simulate(scenario, options).course.com.colwise().norm().maxCoeff(), 1e-9);
+}
+
+/// Half as dense as water, a body floats with half of it below the level.
+TEST_F(SceneEffects, LetABodyFloat) {
+  const ScenarioOf<2> boat = scenario(
+      "dimension = 2\n[body]\nshape = \"bar\"\nsize_m = [0.8, 0.2]\nnodes = 30\nposition_m = [0.0, "
+      "0.05]\n[material]\ndensity_kg_m3 = 500.0\n[water]\nlevel_m = 0.0\n");
+  retarget::SimulationOptions options;
+  options.duration_s = 6;
+  const retarget::Simulation run = retarget::simulate(boat, options);
+  EXPECT_NEAR(run.course.com(1, run.course.com.cols() - 1), 0, 0.02);
+  EXPECT_LT(run.report.momentum_residual_mg, 1e-6);
+}
+
+TEST_F(SceneEffects, AloneAndTogetherAreMeasured) {
+  retarget::SimulationOptions options;
+  options.duration_s = 0.2;
+  const auto rows = retarget::measure_effects(scenario(kBody + "[water]\n"), options);
+  std::vector<std::string> names;
+  for (const retarget::EffectRow& row : rows) {
+    names.push_back(row.effect);
+    EXPECT_GT(row.ms_per_sim_s, 0);
+    EXPECT_TRUE(row.stable);
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"none", "gravity", "water", "volume", "damping", "all"}));
+  EXPECT_EQ(rows[0].difference_length, 0);
+  EXPECT_GT(rows[1].difference_length, 0.1);  // it falls
+  EXPECT_GT(rows[5].difference_length, 0);
+}
+
+}  // namespace
+}  // namespace hydrostat::io

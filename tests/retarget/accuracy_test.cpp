@@ -1,0 +1,178 @@
+#include "retarget/accuracy.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "physics/element_body.h"
+#include "retarget/step_cost.h"
+#include "tests/sanitizers.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+using Scenario = ScenarioOf<2>;
+
+/// A plate in the plane, of springs or of finite elements, drawn from a seed: its size, stuff, start and what it meets.
+Scenario plate(unsigned seed) {
+  std::mt19937 random(seed);
+  const auto within = [&](double low, double high) {
+    return low + (high - low) * (static_cast<double>(random()) / 4294967295.0);
+  };
+  const physics::SimplexMeshOf<2> mesh = physics::mesh_of_box<2>({within(0.3, 0.8), within(0.15, 0.3)}, {5, 2});
+  const physics::ElementMesh<2> elements{mesh.nodes,
+                                         mesh.simplices,
+                                         {{1000, std::pow(10, within(4.5, 6)), within(0.3, 0.45)}},
+                                         Eigen::VectorXd::Ones(mesh.simplices.cols())};
+  const double damping = within(0, 0.01);
+  Scenario scenario;
+  scenario.scene.body =
+      random() % 2 == 0
+          ? make_spring_body<2>(elements, damping)
+          : physics::make_body<2>(elements, physics::ElementBodyOptions{physics::ElasticLaw::kStableNeoHookean, 0, damping});
+  scenario.scene.has_ground = random() % 2 == 0;
+  scenario.scene.body.rest.row(1).array() += within(0.16, 0.3);
+  physics::touch_with_whole_surface(scenario.scene);
+  scenario.start = {scenario.scene.body.rest, physics::PointsOf<2>::Zero(2, mesh.nodes.cols())};
+  const double turn = within(-3, 3), fast = within(-1, 1);
+  const Eigen::Vector2d centre = scenario.scene.body.rest.rowwise().mean();
+  for (Eigen::Index i = 0; i < mesh.nodes.cols(); ++i) {
+    const Eigen::Vector2d arm = scenario.start.x.col(i) - centre;
+    scenario.start.v.col(i) = Eigen::Vector2d(fast - turn * arm.y(), turn * arm.x());
+  }
+  scenario.length = (mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff()).maxCoeff();
+  scenario.size = physics::size_of_volume<2>(scenario.scene.body.rest_volume.sum());
+  return scenario;
+}
+
+/// How far a setting is from a motion eight times as fine, in windows that the estimate has not seen [per L].
+double true_error(const Scenario& scenario, AccuracyOptions options, const StepSetting& setting) {
+  options.fineness = 8;
+  options.windows += 3;
+  const ReferenceOf<2> truth = make_reference(scenario, options, false);
+  return measure_error(truth, scenario, setting).error_rel_length;
+}
+
+AccuracyOptions short_motion() {
+  AccuracyOptions options;
+  options.duration_s = 0.5;
+  options.windows = 4;
+  return options;
+}
+
+TEST(Accuracy, ReferenceIsWhatASecondMethodFinds) {
+  for (unsigned seed = 1; seed <= trials(5u); ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Scenario scenario = plate(seed);
+    const ReferenceOf<2> reference = make_reference(scenario, short_motion());
+    EXPECT_LT(reference.uncertainty_m() / scenario.length, 0.01);
+    EXPECT_EQ(reference.windows.size() > 1, scenario.scene.has_ground);
+    EXPECT_NE(reference.setting.method, reference.check.method);
+    // It errs by what it says when its own step is tried against it.
+    const AccuracyRow own = measure_error(reference, scenario, reference.setting);
+    EXPECT_EQ(own.error_rms_m, 0);
+    EXPECT_TRUE(own.stable);
+  }
+}
+
+TEST(Accuracy, ShorterStepsErrLess) {
+  const Scenario scenario = plate(2);
+  const ReferenceOf<2> reference = make_reference(scenario, short_motion(), false);
+  double last = 1;
+  for (const double dt_s : {1.0 / 30, 1.0 / 120, 1.0 / 480}) {
+    const double error = measure_error(reference, scenario, {physics::Method::kEuler, dt_s}).error_rms_m;
+    EXPECT_LT(error, 0.6 * last);
+    last = error;
+  }
+}
+
+TEST(Accuracy, IsWithinTwiceTheEstimateInNineOfTen) {
+  int within = 0, all = 0;
+  for (unsigned seed = 100; seed < 100 + trials(10u); ++seed) {
+    const Scenario scenario = plate(seed);
+    const StepChoice choice =
+        choose_setting(make_reference(scenario, short_motion(), false), 0.01 * scenario.length, std::nullopt);
+    const double error = true_error(scenario, short_motion(), choice.setting);
+    within += error <= 2 * choice.estimated_error_m / scenario.length;
+    ++all;
+    EXPECT_LT(error, 0.02) << "seed " << seed;
+    EXPECT_TRUE(choice.is_met) << "seed " << seed;
+  }
+  EXPECT_GE(within, 0.9 * all);
+}
+
+/// Where nobody asked for a bound the estimate is made from few runs.
+TEST(Accuracy, OfAGivenSettingIsWithinTwiceItsEstimateInNineOfTen) {
+  int within = 0, all = 0;
+  for (unsigned seed = 200; seed < 200 + trials(10u); ++seed) {
+    const Scenario scenario = plate(seed);
+    SimulationOptions options;
+    options.duration_s = 0.5;
+    options.dt_s = 1.0 / 120;
+    options.method = physics::kMethods[seed % 4];  // `spring` is another body
+    const double estimate = estimated_error(scenario, options);
+    const double error = true_error(scenario, short_motion(), {options.method, options.dt_s});
+    within += error <= 2 * estimate;
+    ++all;
+    EXPECT_LT(estimate, 20 * error + 1e-3) << "seed " << seed;  // nor is it mere caution
+  }
+  EXPECT_GE(within, 0.9 * all);
+}
+
+TEST(Accuracy, ChoiceHangsOnNoClock) {
+  const Scenario scenario = plate(5);
+  const ReferenceOf<2> reference = make_reference(scenario, short_motion(), false);
+  const StepChoice once = choose_setting(reference, 0.01 * scenario.length, std::nullopt);
+  const StepChoice again = choose_setting(reference, 0.01 * scenario.length, std::nullopt);
+  ASSERT_EQ(once.tried.size(), again.tried.size());
+  for (std::size_t k = 0; k < once.tried.size(); ++k) {
+    EXPECT_EQ(once.tried[k].work_ms, again.tried[k].work_ms);
+    EXPECT_EQ(once.tried[k].error_rms_m, again.tried[k].error_rms_m);
+    EXPECT_GT(once.tried[k].work_ms, 0);
+  }
+  EXPECT_EQ(once.setting.method, again.setting.method);
+  EXPECT_EQ(once.setting.dt_s, again.setting.dt_s);
+}
+
+/// The body in another mesh starts from the same shape and speed.
+TEST(Accuracy, CarriesAMotionOverToAnotherMesh) {
+  const auto bar = [](int cells) {
+    const physics::SimplexMeshOf<2> mesh = physics::mesh_of_box<2>({0.8, 0.2}, {4 * cells, cells});
+    const physics::ElementMesh<2> elements{
+        mesh.nodes, mesh.simplices, {{1000, 1e6, 0.3}}, Eigen::VectorXd::Ones(mesh.simplices.cols())};
+    Scenario scenario;
+    scenario.scene.body =
+        physics::make_body<2>(elements, physics::ElementBodyOptions{physics::ElasticLaw::kStableNeoHookean, 0, 0.0});
+    scenario.scene.has_ground = false;
+    physics::touch_with_whole_surface(scenario.scene);
+    scenario.start = {scenario.scene.body.rest, physics::PointsOf<2>::Zero(2, mesh.nodes.cols())};
+    scenario.start.v.row(0).setConstant(0.7);
+    scenario.length = 0.8;
+    return scenario;
+  };
+  AccuracyOptions options;
+  options.duration_s = 0.2;
+  const ReferenceOf<2> reference = make_reference(bar(2), options, false);
+  const AccuracyRow row = measure_error(reference, bar(3), {physics::Method::kImplicit, 1.0 / 240});
+  EXPECT_LT(row.error_rel_length, 1e-3);  // it falls freely: meshes do not matter, explicit is ahead by half a step
+  EXPECT_EQ(row.nodes, bar(3).scene.body.node_count());
+}
+
+TEST(ParetoFront, HoldsWhatNothingBeatsInBoth) {
+  const auto row = [](double error, double ms, bool stable = true) {
+    AccuracyRow made;
+    made.error_rms_m = error;
+    made.ms_per_sim_s = made.work_ms = ms;
+    made.stable = stable;
+    return made;
+  };
+  const std::vector<AccuracyRow> rows{row(3, 1), row(1, 3), row(2, 2), row(2, 3), row(3, 1), row(0, 0, false)};
+  EXPECT_EQ(pareto_front(rows), (std::vector<bool>{true, true, true, false, false, false}));
+  EXPECT_EQ(cheapest_within(rows, 2.5), 2);
+  EXPECT_EQ(cheapest_within(rows, 0.5), -1);
+  EXPECT_EQ(most_accurate(rows), 1);
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

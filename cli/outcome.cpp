@@ -23,16 +23,16 @@ void report_replays(const retarget::Performances& performances, retarget::RunRep
   report.outcome_ok = !is_down(performances.main());
 }
 
-void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
-                   const retarget::Performances& performances, const retarget::RunReport& report) {
+void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
+                   const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report) {
   const retarget::Replay& run = performances.main();
   const bool down = is_down(run);
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
-                        {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
-                        performer.scene.body.mass, run.motion, {});
+                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance},
+                        performer.mesh, performer.scene.body.mass, run.motion, {});
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));
-  io::write_performance_page(writer.directory() / "report.html", performer, signals, performances, report);
+  io::write_performance_page(writer.directory() / "report.html", performer, appearance, signals, performances, report);
 }
 
 retarget::SignalsReport signals_report(const retarget::SignalSet& signals) {

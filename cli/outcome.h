@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "io/appearance.h"
 #include "io/creature_directory.h"
 #include "retarget/performance.h"
 
@@ -14,8 +15,8 @@ bool is_down(const retarget::Replay& replay);
 void report_replays(const retarget::Performances& performances, retarget::RunReport& report);
 
 /// Writes replay.glb, or failed.glb where the run is down, and takes the other one away; report.json and report.html.
-void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
-                   const retarget::Performances& performances, const retarget::RunReport& report);
+void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
+                   const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report);
 
 /// The figures of a signal set; its error against the activations is not known here.
 retarget::SignalsReport signals_report(const retarget::SignalSet& signals);

@@ -95,11 +95,12 @@ retarget::PerformOptions perform_options(const ReplayCommand& command, const io:
 }
 
 /// The motion alone, for -o.
-int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const retarget::Performances& performances) {
+int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const io::Appearance& appearance,
+                 const retarget::Performances& performances) {
   const retarget::Replay& run = performances.main();
   const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
-  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
-                        performer.scene.body.mass, run.motion, {});
+  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance},
+                        performer.mesh, performer.scene.body.mass, run.motion, {});
   return tell_run(run, command.directory, file.string());
 }
 
@@ -119,7 +120,7 @@ int replay(const ReplayCommand& command) {
   const retarget::Performances performances =
       stages.run("replay", [&] { return retarget::perform(performer, creature.signals, options); });
   if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
-  if (!writer) return write_motion(command, performer, performances);
+  if (!writer) return write_motion(command, performer, creature.appearance, performances);
 
   retarget::RunReport& report = creature.target.report;
   const double signal_error = report.signals.error_rms_l0;
@@ -132,7 +133,7 @@ int replay(const ReplayCommand& command) {
   report_replays(performances, report);
   report.timing_s = stages.timing_s;
   try {
-    write_outcome(*writer, performer, creature.signals, performances, report);
+    write_outcome(*writer, performer, creature.appearance, creature.signals, performances, report);
   } catch (const Error& error) {
     throw writer->as_seen(error);
   }

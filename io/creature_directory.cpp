@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 9> kOwnFiles{"creature.toml", "body.json",  "target.bin", "signals.json", "reference.glb",
+constexpr std::array<std::string_view, 10> kOwnFiles{"appearance.bin", "creature.toml", "body.json",  "target.bin", "signals.json", "reference.glb",
                                                     "replay.glb",    "failed.glb", "report.json", "report.html"};
 
 Error directory_error(const fs::path& shown_as, int error_number) {

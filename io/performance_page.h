@@ -11,7 +11,7 @@ namespace hydrostat::io {
 /// heading, drift, slip, correction, saturation, the mean activation of each bone region, the missing wrench, and the contacts
 /// as planned and as they came. Throws Error when the file cannot be written.
 void write_performance_page(const std::filesystem::path& path, const retarget::Performer& performer,
-                            const retarget::SignalSet& signals, const retarget::Performances& performances,
-                            const retarget::RunReport& report);
+                            const Appearance& appearance, const retarget::SignalSet& signals,
+                            const retarget::Performances& performances, const retarget::RunReport& report);
 
 }  // namespace hydrostat::io

@@ -122,7 +122,8 @@ io::ImportedCharacter import(const ConvertOptions& options) {
   io::ImportedCharacter imported;
   io::ImportOptions import_options = options.import;
   import_options.sample_rate_hz = retarget::CreatureOptions().rate_hz;
-  imported.character = io::import_character(options.clip_file, options.clip, import_options, &imported.warnings);
+  imported.character = io::import_character(options.clip_file, options.clip, import_options, &imported.warnings,
+                                             &imported.appearance);
   return imported;
 }
 
@@ -249,6 +250,7 @@ class Conversion {
 
   void run(const io::ImportedCharacter& imported, double wished_limit) {
     add_warnings(imported.warnings);
+    appearance_ = imported.appearance;
     make_body(imported);
     find_activations(wished_limit);
     solve_signals();
@@ -367,14 +369,15 @@ class Conversion {
       writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                                dominant_bones_of_nodes(creature_.mesh.bone_weights)));
       writer_.write("target.bin", target_file_);
+      if (!appearance_.parts.empty()) writer_.write("appearance.bin", io::appearance_bytes(appearance_));
       writer_.write("signals.json", signals_text_);
       io::write_skinned_glb(writer_.directory() / "reference.glb",
-                            {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
-                            performer.scene.body.mass, performer.prepared.target, {});
+                            {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance_},
+                            performer.mesh, performer.scene.body.mass, performer.prepared.target, {});
       return 0;
     });
     target_.report.timing_s = stages_.timing_s;
-    write_outcome(writer_, performer, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
+    write_outcome(writer_, performer, appearance_, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
   }
 
   const ConvertOptions& options_;
@@ -389,6 +392,7 @@ class Conversion {
   retarget::SignalSet signals_;
   std::optional<ChosenStep> chosen_;
   retarget::Performances performances_;
+  io::Appearance appearance_;
   std::string target_file_, signals_text_;
 };
 

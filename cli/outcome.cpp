@@ -24,17 +24,17 @@ void report_replays(const retarget::Performances& performances, retarget::RunRep
   report.outcome_ok = !is_down(performances.main()) && report.accuracy.is_met();
 }
 
-void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
-                   const retarget::Performances& performances, const retarget::RunReport& report,
+void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
+                   const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report,
                    const io::AccuracyCurve* curve) {
   const retarget::Replay& run = performances.main();
   const bool down = !report.outcome_ok;
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
-                        {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
-                        performer.scene.body.mass, run.motion, {});
+                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance},
+                        performer.mesh, performer.scene.body.mass, run.motion, {});
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));
-  io::write_performance_page(writer.directory() / "report.html", performer, signals, performances, report,
+  io::write_performance_page(writer.directory() / "report.html", performer, appearance, signals, performances, report,
                              curve == nullptr ? "" : io::accuracy_svg(*curve));
   if (curve != nullptr) write_curve(writer, *curve);
 }

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "io/accuracy_page.h"
+#include "io/appearance.h"
 #include "io/creature_directory.h"
 #include "retarget/performance.h"
 
@@ -16,8 +17,8 @@ void report_replays(const retarget::Performances& performances, retarget::RunRep
 
 /// Writes replay.glb, or failed.glb where the outcome is short of what was asked, and takes the other one away; report.json and
 /// report.html; accuracy.csv and accuracy.svg of a curve.
-void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const retarget::SignalSet& signals,
-                   const retarget::Performances& performances, const retarget::RunReport& report,
+void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
+                   const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report,
                    const io::AccuracyCurve* curve);
 
 /// The figures of a signal set; its error against the activations is not known here.

@@ -98,11 +98,12 @@ retarget::PerformOptions perform_options(const ReplayCommand& command, const io:
 }
 
 /// The motion alone, for -o.
-int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const retarget::Performances& performances) {
+int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const io::Appearance& appearance,
+                 const retarget::Performances& performances) {
   const retarget::Replay& run = performances.main();
   const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
-  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding}, performer.mesh,
-                        performer.scene.body.mass, run.motion, {});
+  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance},
+                        performer.mesh, performer.scene.body.mass, run.motion, {});
   return tell_run(run, command.directory, file.string());
 }
 
@@ -129,7 +130,7 @@ int replay(const ReplayCommand& command) {
   if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
   const bool is_met = !chosen || chosen->report.is_met();
   if (!writer) {
-    const int exit_code = write_motion(command, performer, performances);
+    const int exit_code = write_motion(command, performer, creature.appearance, performances);
     if (is_met || exit_code != kDone) return exit_code;
     std::cerr << too_inaccurate(command.directory, told(*chosen)) << std::endl;
     return kShortOfTarget;
@@ -147,7 +148,7 @@ int replay(const ReplayCommand& command) {
   report_replays(performances, report);
   report.timing_s = stages.timing_s;
   try {
-    write_outcome(*writer, performer, creature.signals, performances, report, chosen ? &chosen->curve : nullptr);
+    write_outcome(*writer, performer, creature.appearance, creature.signals, performances, report, chosen ? &chosen->curve : nullptr);
   } catch (const Error& error) {
     throw writer->as_seen(error);
   }

@@ -20,9 +20,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 11> kOwnFiles{"creature.toml", "body.json",    "target.bin",  "signals.json",
-                                                     "reference.glb", "replay.glb",   "failed.glb",  "report.json",
-                                                     "report.html",   "accuracy.csv", "accuracy.svg"};
+constexpr std::array<std::string_view, 12> kOwnFiles{"appearance.bin", "creature.toml", "body.json",   "target.bin",
+                                                     "signals.json",   "reference.glb", "replay.glb",  "failed.glb",
+                                                     "report.json",    "report.html",   "accuracy.csv", "accuracy.svg"};
 
 Error directory_error(const fs::path& shown_as, int error_number) {
   return {shown_as.string(), "", std::string("the directory cannot be written: ") + std::strerror(error_number),

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "io/gltf_materials.h"
 #include "io/write_file.h"
 #include "retarget/best_fit_rotation.h"
 #include "retarget/error.h"
@@ -128,38 +129,105 @@ retarget::Motion with_closing_frame(const retarget::Motion& motion) {
   return closed;
 }
 
-void add_mesh(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin, const GltfOptions& options) {
-  tinygltf::Primitive primitive;
-  primitive.mode = TINYGLTF_MODE_TRIANGLES;
-  primitive.material = 0;
-  const std::vector<float> positions = floats(skin.vertices);
+void add_positions(BufferWriter& buffer, const Eigen::Matrix3Xd& vertices, tinygltf::Primitive& primitive) {
+  const std::vector<float> positions = floats(vertices);
   const int position =
       buffer.array(positions, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
   buffer.set_bounds(position, positions);
   primitive.attributes["POSITION"] = position;
-  primitive.attributes["NORMAL"] =
-      buffer.array(floats(vertex_normals(skin.vertices, skin.triangles)), TINYGLTF_TARGET_ARRAY_BUFFER,
-                   TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
-  const JointWeights bound = joint_weights(skin.embedding);
+}
+
+void add_joints(BufferWriter& buffer, const retarget::Embedding& embedding, tinygltf::Primitive& primitive) {
+  const JointWeights bound = joint_weights(embedding);
   primitive.attributes["JOINTS_0"] =
       buffer.array(bound.joints, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, TINYGLTF_TYPE_VEC4);
   primitive.attributes["WEIGHTS_0"] =
       buffer.array(bound.weights, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC4);
-  const std::vector<unsigned> corners(skin.triangles.data(), skin.triangles.data() + skin.triangles.size());
+}
+
+/// A property of the vertices; nothing where it has no columns.
+void add_property(BufferWriter& buffer, const char* name, const Eigen::Ref<const Eigen::MatrixXd>& values, int type,
+                  tinygltf::Primitive& primitive) {
+  if (values.cols() == 0) return;
+  primitive.attributes[name] =
+      buffer.array(floats(values), TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, type);
+}
+
+void add_triangles(BufferWriter& buffer, const Eigen::Matrix3Xi& triangles, tinygltf::Primitive& primitive) {
+  const std::vector<unsigned> corners(triangles.data(), triangles.data() + triangles.size());
+  primitive.mode = TINYGLTF_MODE_TRIANGLES;
   primitive.indices = buffer.array(corners, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
                                    TINYGLTF_TYPE_SCALAR);
-  tinygltf::Mesh mesh;
-  mesh.name = options.name;
-  mesh.primitives.push_back(primitive);
-  model.meshes.push_back(mesh);
+}
 
+tinygltf::Primitive part_of_skin(BufferWriter& buffer, const EmbeddedSkin& skin, const Appearance::Part& part) {
+  tinygltf::Primitive primitive;
+  retarget::Embedding embedding;
+  embedding.nodes = skin.embedding.nodes(Eigen::all, part.vertices);
+  embedding.weights = skin.embedding.weights(Eigen::all, part.vertices);
+  add_positions(buffer, skin.vertices(Eigen::all, part.vertices), primitive);
+  add_joints(buffer, embedding, primitive);
+  add_property(buffer, "NORMAL", part.normals, TINYGLTF_TYPE_VEC3, primitive);
+  add_property(buffer, "TANGENT", part.tangents, TINYGLTF_TYPE_VEC4, primitive);
+  for (std::size_t set = 0; set < part.uvs.size(); ++set)
+    add_property(buffer, ("TEXCOORD_" + std::to_string(set)).c_str(), part.uvs[set], TINYGLTF_TYPE_VEC2, primitive);
+  add_property(buffer, "COLOR_0", part.colours, TINYGLTF_TYPE_VEC4, primitive);
+  add_triangles(buffer, part.triangles, primitive);
+  return primitive;
+}
+
+tinygltf::Primitive plain_skin(BufferWriter& buffer, const EmbeddedSkin& skin) {
+  tinygltf::Primitive primitive;
+  add_positions(buffer, skin.vertices, primitive);
+  add_property(buffer, "NORMAL", vertex_normals(skin.vertices, skin.triangles), TINYGLTF_TYPE_VEC3, primitive);
+  add_joints(buffer, skin.embedding, primitive);
+  add_triangles(buffer, skin.triangles, primitive);
+  return primitive;
+}
+
+/// What skin without a material looks like.
+tinygltf::Material plain_material(const GltfOptions& options) {
   tinygltf::Material material;
   material.name = options.name;
   material.pbrMetallicRoughness.baseColorFactor.assign(options.colour.begin(), options.colour.end());
   material.pbrMetallicRoughness.metallicFactor = 0;
   material.pbrMetallicRoughness.roughnessFactor = 0.7;
   material.doubleSided = true;
-  model.materials.push_back(material);
+  return material;
+}
+
+void add_parts(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin, const GltfOptions& options,
+               tinygltf::Mesh& mesh) {
+  std::vector<int> image_views;
+  for (const Image& image : skin.appearance->images)
+    image_views.push_back(buffer.view(std::vector<char>(image.bytes.begin(), image.bytes.end()), 0));
+  write_materials(*skin.appearance, image_views, model);
+  int plain = -1;
+  for (const Appearance::Part& part : skin.appearance->parts) {
+    if (part.material < 0 && plain < 0) {
+      plain = static_cast<int>(model.materials.size());
+      tinygltf::Material material = plain_material(options);
+      // Vertex colours are factors.
+      if (part.colours.size() > 0) material.pbrMetallicRoughness.baseColorFactor.assign(4, 1);
+      model.materials.push_back(std::move(material));
+    }
+    tinygltf::Primitive primitive = part_of_skin(buffer, skin, part);
+    primitive.material = part.material < 0 ? plain : part.material;
+    mesh.primitives.push_back(std::move(primitive));
+  }
+}
+
+void add_mesh(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin, const GltfOptions& options) {
+  tinygltf::Mesh mesh;
+  mesh.name = options.name;
+  if (skin.appearance != nullptr && !skin.appearance->parts.empty()) {
+    add_parts(model, buffer, skin, options, mesh);
+  } else {
+    mesh.primitives.push_back(plain_skin(buffer, skin));
+    mesh.primitives.front().material = 0;
+    model.materials.push_back(plain_material(options));
+  }
+  model.meshes.push_back(std::move(mesh));
 }
 
 /// Scene nodes: 0 is the mesh, 1 the still root of the skeleton, 2 + n the joint of control node n.

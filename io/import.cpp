@@ -6,6 +6,7 @@
 
 #include "io/capsules.h"
 #include "io/clip_range.h"
+#include "io/images.h"
 #include "io/import_worker.h"
 #include "io/read_chosen_parts.h"
 #include "io/rig.h"
@@ -107,11 +108,12 @@ Scene read_chosen_parts(const std::string& path, const ImportOptions& options) {
   Scene scene = read_in_worker(path, options.limits);
   settle_axes(scene, options.up, options.metres_per_unit);
   select_parts(scene, options.meshes, options.root, path);
+  settle_images(scene, path);
   return scene;
 }
 
 retarget::Character import_character(const std::string& path, const std::string& clip, const ImportOptions& options,
-                                     std::vector<std::string>* warnings) {
+                                     std::vector<std::string>* warnings, Appearance* appearance) {
   const Scene scene = read_chosen_parts(path, options);
   const std::size_t chosen = choose_clip(scene, clip, path);
   Rig rig = build_rig(scene, path);
@@ -119,6 +121,7 @@ retarget::Character import_character(const std::string& path, const std::string&
   character.clip = sample(rig, scene, chosen, options, path);
   if (rig.skin.vertices.cols() == 0) add_capsules(rig, path);
   const Eigen::Affine3d upright = stand_upright(rig, character.clip.bone_pose.front());
+  if (appearance) *appearance = build_appearance(scene, rig, split_turn(upright.linear()).rotation);
   character.skeleton = std::move(rig.skeleton);
   for (Eigen::Affine3d& bind : character.skeleton.bind_pose) bind = upright * bind;
   character.skin = std::move(rig.skin);

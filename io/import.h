@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "io/appearance.h"
 #include "io/read_limits.h"
 #include "retarget/clip.h"
 #include "retarget/error.h"
@@ -27,10 +28,10 @@ struct ImportOptions {
 /// The bind pose is turned (by one of the 24 turns that take axes to axes) and scaled as a whole so that it stands as the
 /// character stands at the clip's first key; bone space is right-handed, orthonormal and in metres in the bind pose.
 /// Skinning is exact: sum(weight * bone_pose * inverse(bind_pose)) takes a vertex where the file has it. `warnings`, when
-/// given, receives what the importer had to decide. Throws Error: no file, not readable, no skeleton, no skinned mesh, no
+/// given, receives what the importer had to decide, and `appearance` what the skin looks like. Throws Error: no file, not readable, no skeleton, no skinned mesh, no
 /// such clip (those that exist are listed), no clip of length.
 retarget::Character import_character(const std::string& path, const std::string& clip, const ImportOptions& options,
-                                     std::vector<std::string>* warnings = nullptr);
+                                     std::vector<std::string>* warnings = nullptr, Appearance* appearance = nullptr);
 
 struct BoneInfo {
   std::string name, parent;  // no parent: a root

@@ -43,7 +43,7 @@ bool signals_fit_body(const retarget::SignalSet& signals, const physics::Body& b
 LoadedCreature load_creature(const std::filesystem::path& creature) {
   if (!is_creature(creature)) throw Error(creature.string(), "", "is no creature", "Make one with 'hydrostat convert'.");
   const std::filesystem::path body_file = creature / "body.json", target_file = creature / "target.bin",
-                              signals_file = creature / "signals.json";
+                              signals_file = creature / "signals.json", appearance_file = creature / "appearance.bin";
   LoadedCreature loaded;
   loaded.record = read_creature_record(creature);
   if (setting(loaded.record, "kind", "") == "scene") {
@@ -56,6 +56,10 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
   if (!target_fits_body(loaded.target.performer)) throw Error(target_file.string(), "", "does not belong to body.json", kMend);
   if (!signals_fit_body(loaded.signals, loaded.target.performer.scene.body)) {
     throw Error(signals_file.string(), "'channels'", "are not the constraints of body.json", kMend);
+  }
+  if (std::filesystem::exists(appearance_file)) {
+    loaded.appearance = parse_appearance(read_file(appearance_file), appearance_file.string(),
+                                         loaded.target.performer.skin.vertices.cols());
   }
   retarget::SelfContactPlan plan = retarget::plan_self_contact(loaded.target.performer);
   loaded.target.performer.scene.self_contact = std::move(plan.settings);

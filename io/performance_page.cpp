@@ -124,10 +124,12 @@ std::vector<PageContactRow> contact_rows(const retarget::PreparedTarget& prepare
 }  // namespace
 
 void write_performance_page(const std::filesystem::path& path, const retarget::Performer& performer,
-                            const retarget::SignalSet& signals, const retarget::Performances& performances,
-                            const retarget::RunReport& report, const std::string& curve) {
+                            const Appearance& appearance, const retarget::SignalSet& signals,
+                            const retarget::Performances& performances, const retarget::RunReport& report,
+                            const std::string& curve) {
   const std::vector<Run> runs = runs_of(performances);
   PageInput page{report, performer.skin, performer.embedding, performer.mesh, {}, {}, {}, 0};
+  page.appearance = &appearance;
   page.motions.push_back({PageRole::kClip, true, performer.clip_skin});
   page.motions.push_back({PageRole::kTarget, false, performer.prepared.target});
   for (const Run& run : runs) page.motions.push_back({run.role, false, run.replay.motion});

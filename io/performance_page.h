@@ -12,7 +12,8 @@ namespace hydrostat::io {
 /// as planned and as they came; the curve of its accuracy (accuracy_svg) where there is one. Throws Error when the file cannot
 /// be written.
 void write_performance_page(const std::filesystem::path& path, const retarget::Performer& performer,
-                            const retarget::SignalSet& signals, const retarget::Performances& performances,
-                            const retarget::RunReport& report, const std::string& curve = "");
+                            const Appearance& appearance, const retarget::SignalSet& signals,
+                            const retarget::Performances& performances, const retarget::RunReport& report,
+                            const std::string& curve = "");
 
 }  // namespace hydrostat::io

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "io/assimp_materials.h"
+#include "io/cut_polygons.h"
 #include "io/lost_curves.h"
 #include "io/read_scene.h"
 #include "io/track.h"
@@ -64,7 +66,7 @@ class AssimpReader {
     set_up(importer_);
     // The validation refuses scenes without a mesh, which is what BVH files are.
     const unsigned validation = scene_.format == "bvh" ? 0U : static_cast<unsigned>(aiProcess_ValidateDataStructure);
-    theirs_ = importer_.ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType | validation);
+    theirs_ = read_in_triangles(importer_, path, validation);
     if (theirs_ == nullptr || theirs_->mRootNode == nullptr) refuse_file(importer_.GetErrorString());
   }
 
@@ -78,6 +80,7 @@ class AssimpReader {
     for (auto& [name, node] : joint_names_) node = joint_node(name);
     for (unsigned a = 0; a < theirs_->mNumAnimations; ++a) read_clip(*theirs_->mAnimations[a]);
     for (const auto& [node, place] : meshes_on_) read_mesh(node, place);
+    read_all_materials();
     return std::move(scene_);
   }
 
@@ -293,6 +296,18 @@ class AssimpReader {
     return channel;
   }
 
+  void read_all_materials() {
+    if (scene_.format == "collada") read_materials(*theirs_, scene_);
+    if (scene_.format == "fbx" && !scene_.meshes.empty()) read_fbx_materials(path_, *theirs_, scene_);
+    // What assimp made up is as good as none.
+    for (SceneMesh& mesh : scene_.meshes) {
+      for (int& material : mesh.triangle_materials) {
+        const bool is_there = material >= 0 && static_cast<std::size_t>(material) < scene_.materials.size();
+        if (!is_there || scene_.materials[static_cast<std::size_t>(material)].name.empty()) material = -1;
+      }
+    }
+  }
+
   void read_mesh(const aiNode* node, int place) {
     for (unsigned m = 0; m < node->mNumMeshes; ++m) {
       const aiMesh& theirs = *theirs_->mMeshes[node->mMeshes[m]];
@@ -301,9 +316,13 @@ class AssimpReader {
       ours.node = place;
       read_surface(theirs, ours);
       if (ours.triangles.cols() == 0) continue;
+      read_looks(theirs, static_cast<int>(theirs.mMaterialIndex), ours);
       for (unsigned b = 0; b < theirs.mNumBones; ++b) ours.joints.push_back(read_joint(*theirs.mBones[b], ours));
       // The offset matrices of 3ds Max files lack what moves the mesh alone. [5]
-      ours.vertices = geometry_[static_cast<std::size_t>(place)] * ours.vertices;
+      const Eigen::Affine3d& geometry = geometry_[static_cast<std::size_t>(place)];
+      ours.vertices = geometry * ours.vertices;
+      if (std::abs(geometry.linear().determinant()) > 0)
+        ours.normals = geometry.linear().inverse().transpose() * ours.normals;
       scene_.meshes.push_back(std::move(ours));
     }
   }

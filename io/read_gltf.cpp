@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "io/gltf_materials.h"
 #include "io/read_scene.h"
 #include "io/track.h"
 #include "retarget/error.h"
@@ -17,8 +18,16 @@ namespace hydrostat::io {
 namespace {
 
 constexpr const char* kExportAnew = "Export the file anew";
+constexpr double kFarthestPlace = 1e6;          // in an image, in its widths
+constexpr std::size_t kMostSparse = 5'000'000;  // elements of an accessor that no buffer bounds
 
-bool ignore_image(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
+/// Keeps the bytes of an image that the text holds as data; others lie where they can be read at leisure.
+bool keep_image(tinygltf::Image* image, const int index, std::string*, std::string*, int, int, const unsigned char* bytes,
+                int size, void* kept) {
+  auto& images = *static_cast<std::vector<std::string>*>(kept);
+  images.resize(std::max(images.size(), static_cast<std::size_t>(index) + 1));
+  if (image->bufferView < 0 && image->uri.empty())
+    images[static_cast<std::size_t>(index)].assign(reinterpret_cast<const char*>(bytes), static_cast<std::size_t>(size));
   return true;
 }
 
@@ -29,9 +38,9 @@ std::string upper_first(std::string text) {
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-tinygltf::Model load(const std::string& path) {
+tinygltf::Model load(const std::string& path, std::vector<std::string>& images) {
   tinygltf::TinyGLTF loader;
-  loader.SetImageLoader(ignore_image, nullptr);
+  loader.SetImageLoader(keep_image, &images);
   tinygltf::Model model;
   std::string failure, warning;
   std::string extension = std::filesystem::path(path).extension().string();
@@ -78,10 +87,12 @@ double decode(const unsigned char* at, int component_type, bool normalised) {
 /// Reads one file; its parts become ours one after the other.
 class GltfReader {
  public:
-  explicit GltfReader(const std::string& path) : path_(path), model_(load(path)) {}
+  explicit GltfReader(const std::string& path) : path_(path), model_(load(path, images_)) {}
 
   Scene read() {
     scene_.format = "gltf";
+    scene_.materials = read_materials(model_, scene_.warnings);
+    scene_.images = read_images(model_, images_);
     read_nodes();
     read_meshes();
     for (std::size_t a = 0; a < model_.animations.size(); ++a) read_clip(model_.animations[a], a);
@@ -100,8 +111,36 @@ class GltfReader {
     return items[static_cast<std::size_t>(index)];
   }
 
+  /// Elements one after the other in a buffer view, as columns.
+  struct Place {
+    int view;
+    std::size_t offset;  // [bytes] in the view
+    std::size_t count, stride;
+    int component_type;
+    bool normalised;
+  };
+  Eigen::MatrixXd numbers_at(const Place& place, Eigen::Index components, const std::string& where) const {
+    const tinygltf::BufferView& view = at(model_.bufferViews, place.view, where);
+    const tinygltf::Buffer& buffer = at(model_.buffers, view.buffer, where);
+    const int width = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(place.component_type));
+    const auto element = static_cast<std::size_t>(width) * static_cast<std::size_t>(components);
+    const std::size_t stride = place.stride > 0 ? place.stride : element;
+    const std::size_t limit = std::min(buffer.data.size(), view.byteOffset + view.byteLength);
+    const std::size_t start = view.byteOffset + place.offset;
+    if (place.count > limit || stride > limit || start > limit || start + (place.count - 1) * stride + element > limit) {
+      refuse(where, "its data runs past the end of the file's buffer");
+    }
+    Eigen::MatrixXd values(components, static_cast<Eigen::Index>(place.count));
+    for (Eigen::Index e = 0; e < values.cols(); ++e) {
+      const unsigned char* from = buffer.data.data() + start + static_cast<std::size_t>(e) * stride;
+      for (Eigen::Index c = 0; c < components; ++c)
+        values(c, e) = decode(from + c * width, place.component_type, place.normalised);
+    }
+    return values;
+  }
+
   /// An accessor's numbers, one element a column. `normalise_integers` for data that may only be normalised (weights,
-  /// rotations).
+  /// rotations). Sparse ones too: what they list stands in for what lies below, zeros where nothing does.
   Eigen::MatrixXd numbers(int index, Eigen::Index components, const std::string& where,
                           bool normalise_integers = false) const {
     const tinygltf::Accessor& accessor = at(model_.accessors, index, where);
@@ -110,27 +149,44 @@ class GltfReader {
         width > 4) {
       refuse(where, "its data has the wrong type");
     }
-    if (accessor.sparse.isSparse)
-      refuse(where, "its data is stored sparsely, which is not read", "Export it without sparse accessors");
-    const tinygltf::BufferView& view = at(model_.bufferViews, accessor.bufferView, where);
-    const tinygltf::Buffer& buffer = at(model_.buffers, view.buffer, where);
-    const int stride = accessor.ByteStride(view);
-    const auto element = static_cast<std::size_t>(width) * static_cast<std::size_t>(components);
-    if (accessor.count == 0 || stride <= 0) refuse(where, "its data is empty or misplaced");
-    const std::size_t limit = std::min(buffer.data.size(), view.byteOffset + view.byteLength);
-    const std::size_t start = view.byteOffset + accessor.byteOffset;
-    if (accessor.count > limit || start + (accessor.count - 1) * static_cast<std::size_t>(stride) + element > limit) {
-      refuse(where, "its data runs past the end of the file's buffer");
-    }
+    if (accessor.count == 0) refuse(where, "its data is empty or misplaced");
     const bool normalised = accessor.normalized || normalise_integers;
-    Eigen::MatrixXd values(components, static_cast<Eigen::Index>(accessor.count));
-    for (Eigen::Index e = 0; e < values.cols(); ++e) {
-      const unsigned char* from =
-          buffer.data.data() + start + static_cast<std::size_t>(e) * static_cast<std::size_t>(stride);
-      for (Eigen::Index c = 0; c < components; ++c)
-        values(c, e) = decode(from + c * width, accessor.componentType, normalised);
+    if (!accessor.sparse.isSparse || accessor.bufferView >= 0) {
+      const int stride = accessor.ByteStride(at(model_.bufferViews, accessor.bufferView, where));
+      if (stride <= 0) refuse(where, "its data is empty or misplaced");
+      Eigen::MatrixXd values = numbers_at({accessor.bufferView, accessor.byteOffset, accessor.count,
+                                           static_cast<std::size_t>(stride), accessor.componentType, normalised},
+                                          components, where);
+      if (accessor.sparse.isSparse) put_listed(accessor, normalised, where, values);
+      return values;
     }
+    if (accessor.count > kMostSparse) refuse(where, "its data has more than " + std::to_string(kMostSparse) + " elements");
+    Eigen::MatrixXd values = Eigen::MatrixXd::Zero(components, static_cast<Eigen::Index>(accessor.count));
+    put_listed(accessor, normalised, where, values);
     return values;
+  }
+
+  /// Source: glTF 2.0, section 3.6.2.3.
+  void put_listed(const tinygltf::Accessor& accessor, bool normalised, const std::string& where,
+                  Eigen::MatrixXd& values) const {
+    const auto& sparse = accessor.sparse;
+    const int type = sparse.indices.componentType;
+    if (sparse.count < 1 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0 ||
+        (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+         type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)) {
+      refuse(where, "its sparse data is empty or misplaced");
+    }
+    const auto count = static_cast<std::size_t>(sparse.count);
+    const Eigen::MatrixXd places = numbers_at(
+        {sparse.indices.bufferView, static_cast<std::size_t>(sparse.indices.byteOffset), count, 0, type, false}, 1, where);
+    const Eigen::MatrixXd listed = numbers_at({sparse.values.bufferView, static_cast<std::size_t>(sparse.values.byteOffset),
+                                               count, 0, accessor.componentType, normalised},
+                                              values.rows(), where);
+    for (Eigen::Index i = 0; i < places.cols(); ++i) {
+      if (places(0, i) >= static_cast<double>(values.cols()))
+        refuse(where, "its sparse data names an element that is not there");
+      values.col(static_cast<Eigen::Index>(places(0, i))) = listed.col(i);
+    }
   }
 
   static Eigen::Affine3d local_transform(const tinygltf::Node& node) {
@@ -207,8 +263,41 @@ class GltfReader {
     if (!ours.vertices.allFinite()) refuse(where, "a vertex is not finite");
     ours.triangles = triangles(primitive, ours.vertices.cols(), where);
     if (ours.triangles.cols() == 0) return;  // points or lines
+    read_looks(primitive, where, ours);
     if (node.skin >= 0) ours.joints = joints(primitive, at(model_.skins, node.skin, where), ours.vertices.cols(), where);
     scene_.meshes.push_back(std::move(ours));
+  }
+
+  void read_looks(const tinygltf::Primitive& primitive, const std::string& where, SceneMesh& ours) {
+    const bool has_material =
+        primitive.material >= 0 && static_cast<std::size_t>(primitive.material) < scene_.materials.size();
+    ours.triangle_materials.setConstant(ours.triangles.cols(), has_material ? primitive.material : -1);
+    // A character whose looks are broken is still one.
+    const auto attribute = [&](const std::string& name, Eigen::Index components, bool normalise) {
+      const auto found = primitive.attributes.find(name);
+      Eigen::MatrixXd values(components, 0);
+      if (found == primitive.attributes.end()) return values;
+      try {
+        values = numbers(found->second, components, where, normalise);
+        if (values.cols() != ours.vertices.cols()) refuse(where, "it has not as many as vertices");
+      } catch (const Error& error) {
+        scene_.warnings.push_back(upper_first(where) + ": " + name + " is left out: " + error.what() + ".");
+        values.resize(components, 0);
+      }
+      return Eigen::MatrixXd(values.unaryExpr([](double value) { return std::isfinite(value) ? value : 0.0; }));
+    };
+    ours.normals = attribute("NORMAL", 3, true);
+    if (!has_material && !primitive.attributes.contains("COLOR_0")) return;
+    for (int set = 0; has_material && primitive.attributes.contains("TEXCOORD_" + std::to_string(set)); ++set) {
+      const Eigen::MatrixXd places = attribute("TEXCOORD_" + std::to_string(set), 2, false);
+      ours.uvs.emplace_back(places.cwiseMax(-kFarthestPlace).cwiseMin(kFarthestPlace));
+    }
+    const auto colours = primitive.attributes.find("COLOR_0");
+    if (colours == primitive.attributes.end()) return;
+    const bool has_alpha = at(model_.accessors, colours->second, where).type == TINYGLTF_TYPE_VEC4;
+    const Eigen::MatrixXd told = attribute("COLOR_0", has_alpha ? 4 : 3, true);
+    ours.colours.setOnes(4, told.cols());
+    ours.colours.topRows(told.rows()) = told.cwiseMax(0).cwiseMin(1);
   }
 
   /// Moves the vertices by the morph targets as the mesh wears them at rest.
@@ -250,11 +339,10 @@ class GltfReader {
   std::vector<SceneMesh::Joint> joints(const tinygltf::Primitive& primitive, const tinygltf::Skin& skin,
                                        Eigen::Index vertices, const std::string& where) {
     const std::string skin_place = "skin '" + skin.name + "'";
-    if (skin.inverseBindMatrices < 0) {
-      refuse(skin_place, "it has no inverse bind matrices, so that its bind pose is unknown",
-             "Export the file anew with the bind pose");
-    }
-    const Eigen::MatrixXd matrices = numbers(skin.inverseBindMatrices, 16, skin_place);
+    // Without such matrices they are identities.
+    Eigen::MatrixXd matrices =
+        Eigen::Matrix4d::Identity().reshaped().replicate(1, static_cast<Eigen::Index>(skin.joints.size()));
+    if (skin.inverseBindMatrices >= 0) matrices = numbers(skin.inverseBindMatrices, 16, skin_place);
     if (matrices.cols() < static_cast<Eigen::Index>(skin.joints.size())) {
       refuse(skin_place, "it has " + std::to_string(matrices.cols()) + " inverse bind matrices for " +
                              std::to_string(skin.joints.size()) + " joints");
@@ -351,6 +439,7 @@ class GltfReader {
   }
 
   const std::string path_;
+  std::vector<std::string> images_;  // that the text holds; filled as the model is loaded
   const tinygltf::Model model_;
   Scene scene_;
   std::vector<int> scene_node_;  // of each node of the file

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "io/images.h"
 #include "io/report.h"
 #include "io/viewer_bundle.h"
 #include "io/write_file.h"
@@ -17,6 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kNodeRate = 60;  // [Hz]
+constexpr std::size_t kMostImageBytes = std::size_t{16} << 20;
 constexpr double kSkinRate = 30;  // [Hz]: vertices are many, and the view interpolates
 
 /// Source: RFC 4648, section 4.
@@ -134,6 +136,63 @@ Json obstacle_json(const PageObstacle& obstacle) {
           {"travel", packed_as<float>(obstacle.travel.frames)}};
 }
 
+Json map_json(const TextureMap& map) {
+  return {{"image", map.image},       {"uv_set", map.uv_set},
+          {"wrap", {map.wrap_u, map.wrap_v}}, {"filters", {map.magnify_filter, map.minify_filter}},
+          {"strength", map.strength}, {"offset", {map.offset.x(), map.offset.y()}},
+          {"scale", {map.scale.x(), map.scale.y()}}, {"turn", map.turn}};
+}
+
+Json material_json(const Material& material) {
+  return {{"base_colour", std::vector<double>(material.base_colour.begin(), material.base_colour.end())},
+          {"roughness", material.roughness},
+          {"emissive", std::vector<double>(material.emissive.begin(), material.emissive.end())},
+          {"alpha_mode", static_cast<int>(material.alpha_mode)},
+          {"alpha_cutoff", material.alpha_cutoff},
+          {"double_sided", material.double_sided},
+          {"unlit", material.unlit},
+          {"base_colour_map", map_json(material.base_colour_map)},
+          {"normal_map", map_json(material.normal_map)},
+          {"emissive_map", map_json(material.emissive_map)}};
+}
+
+/// Images as addresses that hold them; an empty one for those that no map of the page takes, or that are too large for it.
+Json images_json(const Appearance& appearance) {
+  std::vector<bool> shown(appearance.images.size(), false);
+  for (const Material& material : appearance.materials) {
+    for (const TextureMap* map : {&material.base_colour_map, &material.normal_map, &material.emissive_map}) {
+      if (map->image >= 0) shown[static_cast<std::size_t>(map->image)] = true;
+    }
+  }
+  Json images = Json::array();
+  std::size_t total = 0;
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const std::string& bytes = appearance.images[i].bytes;
+    const bool fits = shown[i] && total + bytes.size() <= kMostImageBytes;
+    total += fits ? bytes.size() : 0;
+    images.push_back(fits ? "data:" + image_type(bytes) + ";base64," +
+                                base64({reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()})
+                          : "");
+  }
+  return images;
+}
+
+Json looks_json(const Appearance& appearance) {
+  Json json{{"parts", Json::array()}, {"materials", Json::array()}, {"images", images_json(appearance)}};
+  for (const Appearance::Part& part : appearance.parts) {
+    Json told{{"material", part.material},
+              {"vertices", packed_as<std::uint32_t>(part.vertices)},
+              {"triangles", packed_as<std::uint32_t>(part.triangles)},
+              {"normals", packed_as<float>(part.normals)},
+              {"colours", packed_as<float>(part.colours)},
+              {"uvs", Json::array()}};
+    for (const Eigen::Matrix2Xd& uvs : part.uvs) told["uvs"].push_back(packed_as<float>(uvs));
+    json["parts"].push_back(std::move(told));
+  }
+  for (const Material& material : appearance.materials) json["materials"].push_back(material_json(material));
+  return json;
+}
+
 Json page_json(const PageInput& input) {
   Json json;
   json["report"] = Json::parse(report_json(input.report));
@@ -145,6 +204,7 @@ Json page_json(const PageInput& input) {
   json["skin"] = {{"triangles", packed_as<std::uint32_t>(input.skin.triangles)},
                   {"nodes", packed_as<std::uint32_t>(input.embedding.nodes)},
                   {"weights", packed_as<float>(input.embedding.weights)}};
+  if (input.appearance != nullptr && !input.appearance->parts.empty()) json["looks"] = looks_json(*input.appearance);
   json["body"] = {{"nodes", packed_as<float>(input.body.nodes)}, {"edges", packed_as<std::uint32_t>(input.body.edges)}};
   json["motions"] = Json::array();
   for (const PageMotion& motion : input.motions) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "io/appearance.h"
 #include "retarget/clip.h"
 #include "retarget/contacts.h"
 #include "retarget/control_mesh.h"
@@ -66,12 +67,13 @@ struct PageInput {
   bool has_ground = true;
   Eigen::Vector3d ground_normal = Eigen::Vector3d::UnitY();
   std::vector<PageObstacle> obstacles = {};
-  std::string accuracy_svg = {};  // error against time of what was tried, where an accuracy was asked for
+  std::string accuracy_svg = {};           // error against time of what was tried, where an accuracy was asked for
+  const Appearance* appearance = nullptr;  // what the replay wears; null, or without parts: one colour
 };
 
 /// Writes one HTML file that needs nothing else, no network either: the view of the motions, the charts, the contact
 /// timeline and the report's tables. Motions are thinned to at most 60 Hz (control nodes) and 30 Hz (skin), positions kept
-/// to a 65535th of the largest extent. `#t=1.25&view=side&theme=dark` in its address sets time, view and theme. Throws Error
+/// to a 65535th of the largest extent. Images of the appearance come along up to 16 MiB in all. `#t=1.25&view=side&theme=dark` in its address sets time, view and theme. Throws Error
 /// when the file cannot be written.
 void write_report_page(const std::filesystem::path& path, const PageInput& input);
 

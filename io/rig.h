@@ -8,12 +8,24 @@
 
 namespace hydrostat::io {
 
+/// What one of a rig's meshes tells beside place and weights of its vertices, which are turned into the bind pose; see
+/// SceneMesh.
+struct RigMesh {
+  int first_vertex = 0;  // among the vertices of all meshes
+  Eigen::Matrix3Xd normals;
+  std::vector<Eigen::Matrix2Xd> uvs;
+  Eigen::Matrix4Xd colours;
+};
+
 /// A scene's skeleton and skin in metres, y up, as bound in the file; the same for all its clips.
 struct Rig {
   retarget::Skeleton skeleton;
   std::vector<int> scene_nodes;  // B; the scene node that each bone is
   retarget::SkinnedMesh skin;    // no vertices: the file has a skeleton alone
   Eigen::Affine3d to_ours;       // the file's space to metres, y up: a turn and a scale
+  std::vector<RigMesh> meshes;   // that the skin was made of
+  Eigen::Matrix3Xi corners;      // 3 x T; of each of the skin's triangles the meshes' vertices that were its corners
+  Eigen::VectorXi triangle_materials;  // T; of the scene's, -1 is none
   std::vector<std::string> warnings;
 };
 

@@ -58,7 +58,8 @@ bool weights_agree(const std::vector<retarget::SkinnedMesh::Influence>& a,
 
 /// Makes one vertex of those that share place and weights (seams of texture and normals), and drops triangles that
 /// collapse.
-void weld(retarget::SkinnedMesh& skin) {
+void weld(Rig& rig) {
+  retarget::SkinnedMesh& skin = rig.skin;
   const double grid = kWeldGrid * std::max(extent_of(skin.vertices), 1e-12);
   using Place = std::array<long long, 3>;
   std::map<Place, std::vector<int>> welded_at;
@@ -86,13 +87,19 @@ void weld(retarget::SkinnedMesh& skin) {
   }
   welded.vertices.conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(welded.skin_weights.size()));
   welded.triangles.resize(3, skin.triangles.cols());
+  rig.corners.resize(3, skin.triangles.cols());
   Eigen::Index kept = 0;
   for (Eigen::Index t = 0; t < skin.triangles.cols(); ++t) {
     const Eigen::Vector3i corners = skin.triangles.col(t).unaryExpr([&](int v) { return now[static_cast<std::size_t>(v)]; });
     const bool flat = corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
-    if (!flat) welded.triangles.col(kept++) = corners;
+    if (flat) continue;
+    rig.corners.col(kept) = skin.triangles.col(t);
+    rig.triangle_materials[kept] = rig.triangle_materials[t];
+    welded.triangles.col(kept++) = corners;
   }
   welded.triangles.conservativeResize(Eigen::NoChange, kept);
+  rig.corners.conservativeResize(Eigen::NoChange, kept);
+  rig.triangle_materials.conservativeResize(kept);
   skin = std::move(welded);
 }
 
@@ -113,7 +120,29 @@ void face_outward(Rig& rig) {
   });
   if (!closed || volume >= 0) return;
   skin.triangles.row(1).swap(skin.triangles.row(2));
+  rig.corners.row(1).swap(rig.corners.row(2));
   rig.warnings.push_back("The skin's triangles face inward; they are turned round.");
+}
+
+/// What a mesh tells of its looks; `linear` takes mesh space to the common bind space.
+void add_looks(const SceneMesh& mesh, const Eigen::Matrix3d& linear, int first_vertex, Eigen::Index first_triangle, Rig& rig) {
+  RigMesh looks{first_vertex, {}, mesh.uvs, mesh.colours};
+  if (mesh.normals.size() > 0) {
+    // Normals go by the inverse transposed; the adjugate is that but for a factor, and does without a division.
+    Eigen::Matrix3d turned;
+    for (int k = 0; k < 3; ++k) turned.col(k) = linear.col((k + 1) % 3).cross(linear.col((k + 2) % 3));
+    turned = (linear.determinant() < 0 ? -1 : 1) * rig.to_ours.linear() * turned;
+    looks.normals = turned * mesh.normals;
+    for (auto normal : looks.normals.colwise()) {
+      if (!(normal.norm() > 0)) normal = Eigen::Vector3d::UnitY();
+      normal.normalize();
+    }
+  }
+  rig.meshes.push_back(std::move(looks));
+  rig.triangle_materials.conservativeResize(first_triangle + mesh.triangles.cols());
+  auto materials = rig.triangle_materials.tail(mesh.triangles.cols());
+  materials.setConstant(-1);
+  if (mesh.triangle_materials.size() == materials.size()) materials = mesh.triangle_materials;
 }
 
 }  // namespace
@@ -132,6 +161,7 @@ void add_mesh(const SceneMesh& mesh, const Eigen::Affine3d& into_bind, const std
   if (into_bind.linear().determinant() < 0) {
     skin.triangles.rightCols(mesh.triangles.cols()).row(1).swap(skin.triangles.rightCols(mesh.triangles.cols()).row(2));
   }
+  add_looks(mesh, into_bind.linear(), static_cast<int>(first), first_triangle, rig);
   std::vector<std::map<int, double>> sums(static_cast<std::size_t>(mesh.vertices.cols()));
   for (std::size_t j = 0; j < mesh.joints.size(); ++j) {
     for (const SceneMesh::Weight& weight : mesh.joints[j].weights) {
@@ -151,7 +181,7 @@ void add_mesh(const SceneMesh& mesh, const Eigen::Affine3d& into_bind, const std
 
 void finish_skin(Rig& rig) {
   bind_stray_vertices(rig);
-  weld(rig.skin);
+  weld(rig);
   face_outward(rig);
 }
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "io/appearance.h"
+
 namespace hydrostat::io {
 
 /// How a track runs from one key to the next: held, straight (great arc for rotations), or by Hermite's cubic.
@@ -62,6 +64,10 @@ struct SceneMesh {
   Eigen::Matrix3Xd vertices;   // [file units] 3 x V, mesh space
   Eigen::Matrix3Xi triangles;  // 3 x T
   std::vector<Joint> joints;   // none: not skinned
+  Eigen::VectorXi triangle_materials;  // T, of the scene's; -1 or no entries at all: none
+  Eigen::Matrix3Xd normals;            // 3 x V, of length 1, mesh space; none: not told
+  std::vector<Eigen::Matrix2Xd> uvs;   // of each set 2 x V, v downward
+  Eigen::Matrix4Xd colours;            // 4 x V, linear, 0..1; none: not told
   bool is_wanted = false;      // named by the user: comes along even where nothing carries it
 };
 
@@ -74,6 +80,8 @@ struct Scene {
   std::vector<SceneNode> nodes;                           // parent before child
   std::vector<SceneMesh> meshes;                          // of triangles
   std::vector<SceneClip> clips;
+  std::vector<Material> materials;
+  std::vector<Image> images;
   std::vector<std::string> warnings;
   bool files_confined = false, network_confined = false;  // the worker process while it read (io/confine.h)
 };

@@ -9,7 +9,7 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x324e4353'4f524459;  // begins an answer; another for each form of it
+constexpr std::uint64_t kMagic = 0x334e4353'4f524459;  // begins an answer; another for each form of it
 constexpr std::uint64_t kEnd = 0x2e646e65'2e646e65;    // ends it
 constexpr double kLargestNumber = 1e12;
 constexpr std::size_t kMostNodes = 10000, kMostClips = 2000;  // what follows takes time that grows faster than they do
@@ -21,6 +21,7 @@ class Writer {
   void number(const Number& value) {
     bytes_.append(reinterpret_cast<const char*>(&value), sizeof(Number));
   }
+  void letters(std::string& text) { bytes_ += text; }
   std::size_t count(std::size_t actual, std::size_t /*bytes_each*/) {
     number(static_cast<std::uint64_t>(actual));
     return actual;
@@ -45,6 +46,10 @@ class Reader {
       if (!(std::abs(value) <= kLargestNumber))
         throw std::runtime_error("it holds a number that is not finite, or above 1e12");
     }
+  }
+  void letters(std::string& text) {
+    std::memcpy(text.data(), left_.data(), text.size());  // as many are left: `count` has seen to that
+    left_.remove_prefix(text.size());
   }
   std::size_t count(std::size_t /*actual*/, std::size_t bytes_each) {
     std::uint64_t announced = 0;
@@ -83,14 +88,15 @@ void pass_enum(Wire& wire, Enum& value, Enum last) {
 template <typename Wire>
 void pass(Wire& wire, std::string& text) {
   text.resize(wire.count(text.size(), 1));
-  for (char& letter : text) wire.number(letter);
+  wire.letters(text);
 }
 template <typename Wire, typename Scalar, int Rows, int Cols>
 void pass(Wire& wire, Eigen::Matrix<Scalar, Rows, Cols>& matrix) {
-  const std::size_t rows = wire.count(static_cast<std::size_t>(matrix.rows()), 1);
+  const std::size_t rows = wire.count(static_cast<std::size_t>(matrix.rows()), Cols == 1 ? sizeof(Scalar) : 1);
   const std::size_t cols =
       wire.count(static_cast<std::size_t>(matrix.cols()), sizeof(Scalar) * std::max<std::size_t>(rows, 1));
-  if ((Rows != Eigen::Dynamic && rows != static_cast<std::size_t>(Rows)) || rows > 4 ||
+  // A column may have any number of rows.
+  if ((Rows != Eigen::Dynamic && rows != static_cast<std::size_t>(Rows)) || (rows > 4 && Cols != 1) ||
       (Cols != Eigen::Dynamic && cols != static_cast<std::size_t>(Cols))) {
     throw std::runtime_error("a matrix has the wrong size");
   }
@@ -158,6 +164,38 @@ void pass(Wire& wire, SceneMesh& mesh) {
   pass(wire, mesh.vertices);
   pass(wire, mesh.triangles);
   pass(wire, mesh.joints);
+  pass(wire, mesh.triangle_materials);
+  pass(wire, mesh.normals);
+  pass(wire, mesh.uvs);
+  pass(wire, mesh.colours);
+}
+template <typename Wire>
+void pass(Wire& wire, Image& image) {
+  pass(wire, image.name);
+  pass(wire, image.file);
+  pass(wire, image.bytes);
+}
+template <typename Wire>
+void pass(Wire& wire, TextureMap& map) {
+  for (int* number : {&map.image, &map.uv_set, &map.wrap_u, &map.wrap_v, &map.magnify_filter, &map.minify_filter})
+    pass(wire, *number);
+  pass(wire, map.strength);
+  pass(wire, map.offset);
+  pass(wire, map.scale);
+  pass(wire, map.turn);
+}
+template <typename Wire>
+void pass(Wire& wire, Material& material) {
+  pass(wire, material.name);
+  pass(wire, material.base_colour);
+  pass(wire, material.metallic);
+  pass(wire, material.roughness);
+  pass(wire, material.emissive);
+  pass_enum(wire, material.alpha_mode, AlphaMode::kBlend);
+  pass(wire, material.alpha_cutoff);
+  pass(wire, material.double_sided);
+  pass(wire, material.unlit);
+  for (TextureMap* map : maps_of(material)) pass(wire, *map);
 }
 template <typename Wire>
 void pass(Wire& wire, Scene& scene) {
@@ -168,6 +206,8 @@ void pass(Wire& wire, Scene& scene) {
   pass(wire, scene.nodes);
   pass(wire, scene.meshes);
   pass(wire, scene.clips);
+  pass(wire, scene.materials);
+  pass(wire, scene.images);
   pass(wire, scene.warnings);
   pass(wire, scene.files_confined);
   pass(wire, scene.network_confined);
@@ -191,6 +231,28 @@ void check_track(const Track& track, Eigen::Index rows) {
           "a track's tangents do not fit its times");
 }
 
+void check_looks(const SceneMesh& mesh, std::size_t materials) {
+  const auto fits = [&](Eigen::Index count) { return count == 0 || count == mesh.vertices.cols(); };
+  require(mesh.triangle_materials.size() == 0 || mesh.triangle_materials.size() == mesh.triangles.cols(),
+          "a mesh has not as many materials as triangles");
+  for (const int material : mesh.triangle_materials)
+    require(material == -1 || is_index(material, materials), "a mesh wears a material that is not there");
+  require(fits(mesh.normals.cols()) && fits(mesh.colours.cols()), "a mesh's normals or colours do not fit its vertices");
+  for (const Eigen::Matrix2Xd& places : mesh.uvs) require(fits(places.cols()), "a mesh's places in images do not fit its vertices");
+}
+
+void check_material(const Material& material, std::size_t images) {
+  const auto is_share = [](double value) { return value >= 0 && value <= 1; };
+  require(is_share(material.metallic) && is_share(material.roughness) && material.alpha_cutoff >= 0 &&
+              material.base_colour.minCoeff() >= 0 && material.base_colour.maxCoeff() <= 1 &&
+              material.emissive.minCoeff() >= 0,
+          "a material's numbers are out of their range");
+  for (const TextureMap* map : maps_of(material)) {
+    require(map->image == -1 || is_index(map->image, images), "a material shows an image that is not there");
+    require(map->uv_set >= 0, "a material takes places in images that are not there");
+  }
+}
+
 /// Throws std::runtime_error where an index points nowhere or sizes disagree.
 void check(const Scene& scene) {
   require(scene.metres_per_unit > 0, "the unit is not positive");
@@ -207,6 +269,7 @@ void check(const Scene& scene) {
     for (Eigen::Index i = 0; i < mesh.triangles.size(); ++i) {
       require(is_index(mesh.triangles.data()[i], vertices), "a triangle names a vertex that is not there");
     }
+    check_looks(mesh, scene.materials.size());
     for (const SceneMesh::Joint& joint : mesh.joints) {
       require(is_index(joint.node, scene.nodes.size()), "a skin names a node that is not there");
       for (const SceneMesh::Weight& weight : joint.weights) {
@@ -214,6 +277,7 @@ void check(const Scene& scene) {
       }
     }
   }
+  for (const Material& material : scene.materials) check_material(material, scene.images.size());
   for (const SceneClip& clip : scene.clips) {
     for (const Channel& channel : clip.channels) {
       require(is_index(channel.node, scene.nodes.size()), "a channel moves no node");

@@ -11,6 +11,8 @@ namespace {
 
 constexpr const char* kTargetTitle = "hydrostat.target";
 constexpr const char* kTargetVersion = "2";
+constexpr const char* kAppearanceTitle = "hydrostat.appearance";
+constexpr const char* kAppearanceVersion = "1";
 
 /// Skin weights one after the other.
 struct Influences {
@@ -225,6 +227,34 @@ void name_fields(RecordArchive& archive, PerformedTarget& target) {
                  target.report.warnings);
 }
 
+void name_fields(RecordArchive& archive, Image& image) { archive.fields("name", image.name, "bytes", image.bytes); }
+
+void name_fields(RecordArchive& archive, TextureMap& map) {
+  archive.fields("image", map.image, "uv_set", map.uv_set, "wrap_u", map.wrap_u, "wrap_v", map.wrap_v, "magnify_filter",
+                 map.magnify_filter, "minify_filter", map.minify_filter, "strength", map.strength, "offset", map.offset,
+                 "scale", map.scale, "turn", map.turn);
+}
+
+void name_fields(RecordArchive& archive, Material& material) {
+  archive.fields("name", material.name, "base_colour", material.base_colour, "metallic", material.metallic, "roughness",
+                 material.roughness, "emissive", material.emissive, "alpha_mode", material.alpha_mode, "alpha_cutoff",
+                 material.alpha_cutoff, "double_sided", material.double_sided, "unlit", material.unlit, "base_colour_map",
+                 material.base_colour_map, "metallic_roughness_map", material.metallic_roughness_map, "normal_map",
+                 material.normal_map, "occlusion_map", material.occlusion_map, "emissive_map", material.emissive_map);
+}
+
+void name_fields(RecordArchive& archive, Appearance::Part& part) {
+  archive.fields("material", part.material, "vertices", part.vertices, "triangles", part.triangles, "normals", part.normals,
+                 "tangents", part.tangents, "colours", part.colours);
+  archive.list("uv_sets", "uvs", part.uvs);
+}
+
+void name_fields(RecordArchive& archive, Appearance& appearance) {
+  archive.list("parts", "part", appearance.parts);
+  archive.list("materials", "material", appearance.materials);
+  archive.list("images", "image", appearance.images);
+}
+
 template <typename Result>
 Record record_of(const Result& result) {
   Record record;
@@ -252,6 +282,7 @@ HYDROSTAT_RECORD(retarget::PreparedTarget)
 HYDROSTAT_RECORD(retarget::InverseDynamics)
 HYDROSTAT_RECORD(retarget::Performances)
 HYDROSTAT_RECORD(PerformedTarget)
+HYDROSTAT_RECORD(Appearance)
 #undef HYDROSTAT_RECORD
 
 std::string target_bytes(const PerformedTarget& target) { return packed(record_of(target), kTargetTitle, kTargetVersion); }
@@ -265,6 +296,53 @@ PerformedTarget parse_target(const std::string& bytes, const std::string& file) 
   } catch (const std::out_of_range&) {
     throw damaged;
   }
+}
+
+namespace {
+
+bool is_in(int index, std::size_t count) { return index >= 0 && static_cast<std::size_t>(index) < count; }
+
+template <typename Derived>
+bool are_in(const Eigen::DenseBase<Derived>& indices, Eigen::Index count) {
+  return indices.size() == 0 || (indices.minCoeff() >= 0 && indices.maxCoeff() < count);
+}
+
+bool fits(const Appearance::Part& part, const Appearance& appearance, Eigen::Index vertices) {
+  const Eigen::Index drawn = part.vertices.size();
+  const auto of_all = [&](const auto& values) { return values.cols() == 0 || values.cols() == drawn; };
+  bool sound = are_in(part.vertices, vertices) && are_in(part.triangles, drawn) && of_all(part.normals) &&
+               of_all(part.tangents) && of_all(part.colours);
+  for (const Eigen::Matrix2Xd& uvs : part.uvs) sound = sound && uvs.cols() == drawn;
+  return sound && (part.material == -1 || is_in(part.material, appearance.materials.size()));
+}
+
+bool fits(const Material& material, const Appearance& appearance) {
+  for (const TextureMap* map : maps_of(material)) {
+    if (map->image != -1 && !is_in(map->image, appearance.images.size())) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string appearance_bytes(const Appearance& appearance) {
+  return packed(record_of(appearance), kAppearanceTitle, kAppearanceVersion);
+}
+
+Appearance parse_appearance(const std::string& bytes, const std::string& file, Eigen::Index vertices) {
+  const Error damaged(file, "", "is damaged or of another version", "Make the creature again with 'hydrostat convert'.");
+  const std::optional<Record> record = unpacked(bytes, kAppearanceTitle, kAppearanceVersion);
+  if (!record) throw damaged;
+  try {
+    Appearance appearance = result_of<Appearance>(*record);
+    bool sound = true;
+    for (const Appearance::Part& part : appearance.parts) sound = sound && fits(part, appearance, vertices);
+    for (const Material& material : appearance.materials) sound = sound && fits(material, appearance);
+    if (sound) return appearance;
+  } catch (const std::out_of_range&) {
+    throw damaged;
+  }
+  throw Error(file, "", "does not belong to body.json", "Make the creature again with 'hydrostat convert'.");
 }
 
 }  // namespace hydrostat::io

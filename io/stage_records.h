@@ -1,5 +1,6 @@
 #pragma once
 
+#include "io/appearance.h"
 #include "io/stage_cache.h"
 #include "retarget/creature.h"
 #include "retarget/performance.h"
@@ -10,6 +11,7 @@ namespace hydrostat::io {
 struct ImportedCharacter {
   retarget::Character character;
   std::vector<std::string> warnings;
+  Appearance appearance;  // no record has it: no body depends on it
 };
 
 /// What a replay needs beside body.json and signals.json: of the performer the muscles' fields, the prepared target and the clip,
@@ -31,5 +33,10 @@ Result result_of(const Record& record);
 std::string target_bytes(const PerformedTarget& target);
 /// `file` is what messages call it. Throws Error for bytes that are damaged or of another version.
 PerformedTarget parse_target(const std::string& bytes, const std::string& file);
+
+/// appearance.bin: what the skin looks like, "hydrostat.appearance/1".
+std::string appearance_bytes(const Appearance& appearance);
+/// `vertices`: of the skin. Throws Error for bytes that are damaged, of another version or about another skin.
+Appearance parse_appearance(const std::string& bytes, const std::string& file, Eigen::Index vertices);
 
 }  // namespace hydrostat::io

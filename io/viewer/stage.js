@@ -7,6 +7,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 import { centre, floats, indices, kRoles } from './data.js';
+import { Looks } from './looks.js';
 
 /** The skin that control nodes carry: vertex v is the weighted sum of its four nodes. */
 function embed(nodes, skin, out) {
@@ -93,6 +94,7 @@ export class Stage {
     this.canvas = canvas;
     this.skin = { nodes: indices(page.skin.nodes), weights: floats(page.skin.weights) };
     this.triangles = indices(page.skin.triangles);
+    this.told_looks = page.looks;
     this.edges = indices(page.body.edges);
     this.rest = floats(page.body.nodes);
     this.length = page.report.body.length_m || 1;
@@ -159,7 +161,13 @@ export class Stage {
     const mesh = new Mesh(geometry, material);
     mesh.frustumCulled = false;
     this.scene.add(mesh);
-    return { motion, mesh, visible: ['clip', 'target', 'replay'].includes(motion.role) };
+    const body = { motion, mesh, visible: ['clip', 'target', 'replay'].includes(motion.role) };
+    if (motion.role === 'replay' && this.told_looks) {
+      body.looks = new Looks(this.told_looks, kRoles.replay.colour, () => this.draw());
+      material.visible = false;
+      mesh.add(...body.looks.meshes);
+    }
+    return body;
   }
 
   add_obstacle(told) {
@@ -263,8 +271,9 @@ export class Stage {
     body.mesh.material.transparent = opacity < 1;
     body.mesh.material.opacity = opacity;
     body.mesh.material.depthWrite = opacity === 1;
-    body.mesh.castShadow = side || is_replay;
+    body.mesh.castShadow = (side || is_replay) && !body.looks;
     body.mesh.renderOrder = opacity < 1 ? 1 : 0;
+    body.looks?.dress(opacity);
   }
 
   move_skin(body, t) {
@@ -272,6 +281,7 @@ export class Stage {
     const positions = body.motion.at(t);
     if (body.motion.of_skin) attribute.array.set(positions);
     else embed(positions, this.skin, attribute.array);
+    if (body.looks) return body.looks.move(attribute.array);
     attribute.needsUpdate = true;
     body.mesh.geometry.computeVertexNormals();
   }

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "io/cut_polygons.h"
 #include "io/import_worker.h"
 #include "retarget/error.h"
 #include "tests/io/tiny_gltf_file.h"
@@ -297,6 +298,85 @@ TEST(ImportCharacter, VerticesWithoutWeightsGoWithTheNearestBoneAndAreTold) {
   }
 }
 
+TEST(CutPolygon, AnyStarIsFilledOnceByItsTriangles) {
+  for (const int corners : {3, 4, 5, 50, 501, 20001}) {
+    SCOPED_TRACE(corners);
+    Eigen::Matrix3Xd star(3, corners);
+    for (int i = 0; i < corners; ++i) {  // in a slanted plane; every other corner turns to the right
+      const double angle = 2 * std::numbers::pi * i / corners, radius = i % 2 == 0 ? 1 : 0.6;
+      star.col(i) << radius * std::cos(angle), radius * std::sin(angle), 0.5 * radius * std::cos(angle);
+    }
+    const std::vector<Eigen::Vector3i> triangles = cut_polygon(star);
+    ASSERT_EQ(static_cast<int>(triangles.size()), corners - 2);
+    double whole = 0, cut = 0;  // twice the areas as seen from above
+    const auto area = [&](int a, int b, int c) {
+      const Eigen::Vector3d u = star.col(b) - star.col(a), v = star.col(c) - star.col(a);
+      return u.x() * v.y() - u.y() * v.x();
+    };
+    for (int i = 1; i + 1 < corners; ++i) whole += area(0, i, i + 1);
+    for (const Eigen::Vector3i& t : triangles) {
+      EXPECT_GT(area(t[0], t[1], t[2]), 0);
+      cut += area(t[0], t[1], t[2]);
+    }
+    EXPECT_NEAR(cut, whole, 1e-9);
+  }
+}
+
+/// Leaves nothing below the strip's vertices, and lists those of its right side and its top; `last` is what the last place
+/// is.
+void make_sparse(nlohmann::json& file, GltfBuffer& buffer, int last) {
+  const int places =
+      buffer.add(std::vector<std::uint16_t>{0, 1, 2, 3, 4, static_cast<std::uint16_t>(last)}, 5123, "SCALAR", 1);
+  const int values = buffer.add(
+      std::vector<float>{-0.1f, 0, 0, 0.1f, 0, 0, -0.1f, 1, 0, 0.1f, 1, 0, -0.1f, 2, 0, 0.1f, 2, 0}, 5126, "VEC3", 3);
+  auto& accessor = buffer.accessors[file["meshes"][0]["primitives"][0]["attributes"]["POSITION"].get<std::size_t>()];
+  accessor.erase("bufferView");
+  accessor["sparse"] = {
+      {"count", 6},
+      {"indices",
+       {{"bufferView", buffer.accessors[static_cast<std::size_t>(places)]["bufferView"]}, {"componentType", 5123}}},
+      {"values", {{"bufferView", buffer.accessors[static_cast<std::size_t>(values)]["bufferView"]}}}};
+}
+
+TEST(ImportGltf, SparseDataAndDataOverAnotherAreReadAsTheyMean) {
+  const TemporaryDirectory directory;
+  const TinyGltf whole;
+  TinyGltf sparse, over;
+  sparse.amend = [](auto& json, auto& buffer) { make_sparse(json, buffer, 5); };
+  over.amend = [](auto& json, auto& buffer) {  // the vertices are all at the origin but for those that are listed
+    const int zeros = buffer.add(std::vector<float>(18, 0.0f), 5126, "VEC3", 3);
+    make_sparse(json, buffer, 5);
+    auto& accessor =
+        buffer.accessors[json["meshes"][0]["primitives"][0]["attributes"]["POSITION"].template get<std::size_t>()];
+    accessor["bufferView"] = buffer.accessors[static_cast<std::size_t>(zeros)]["bufferView"];
+  };
+  const retarget::Character expected = import_character(whole.write(directory.path()), "", {});
+  for (const TinyGltf* file : {&sparse, &over}) {
+    const retarget::Character got = import_character(file->write(directory.path()), "", {});
+    EXPECT_EQ(got.skin.vertices, expected.skin.vertices);
+    EXPECT_EQ(got.skin.triangles, expected.skin.triangles);
+  }
+}
+
+TEST(ImportGltf, ASkinWithoutInverseBindMatricesHasIdentities) {
+  const TemporaryDirectory directory;
+  TinyGltf file, identities;
+  file.with_bind_matrices = false;
+  identities.amend = [](auto& json, auto& buffer) {
+    std::vector<float> matrices(32, 0.0f);
+    for (std::size_t k = 0; k < 32; k += 16) matrices[k] = matrices[k + 5] = matrices[k + 10] = matrices[k + 15] = 1;
+    json["skins"][0]["inverseBindMatrices"] = buffer.add(matrices, 5126, "MAT4", 16);
+  };
+  const retarget::Character got = import_character(file.write(directory.path()), "", {});
+  const retarget::Character expected = import_character(identities.write(directory.path()), "", {});
+  ASSERT_EQ(got.clip.frames(), expected.clip.frames());
+  for (int f = 0; f < got.clip.frames(); ++f) {
+    const std::vector<Eigen::Affine3d>& pose = got.clip.bone_pose[static_cast<std::size_t>(f)];
+    EXPECT_EQ(skin_positions(got.skeleton, got.skin, pose),
+              skin_positions(expected.skeleton, expected.skin, expected.clip.bone_pose[static_cast<std::size_t>(f)]));
+  }
+}
+
 struct Refusal {
   const char* name;
   void (*spoil)(TinyGltf&);
@@ -320,8 +400,11 @@ TEST_P(RefusedGltf, IsToldWithPlaceAndMend) {
 
 INSTANTIATE_TEST_SUITE_P(
     Import, RefusedGltf,
-    testing::Values(Refusal{"NoBindMatrices", [](TinyGltf& file) { file.with_bind_matrices = false; }, "skin",
-                            "no inverse bind matrices"},
+    testing::Values(Refusal{"SparseOutside",
+                            [](TinyGltf& file) {
+                              file.amend = [](auto& json, auto& buffer) { make_sparse(json, buffer, 6); };
+                            },
+                            "mesh 'strip'", "names an element that is not there"},
                     Refusal{"NoSkin", [](TinyGltf& file) { file.with_skin = false; }, "skeleton", "no mesh is bound"},
                     Refusal{"NoWeights", [](TinyGltf& file) { file.vertices_without_weights = {0, 1, 2, 3, 4, 5}; },
                             "skeleton", "no mesh is bound"},

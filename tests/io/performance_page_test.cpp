@@ -16,7 +16,7 @@ TEST(PerformancePage, ShowsEveryRunThatThereIs) {
   options.replay.duration_s = 0.2;
   const TemporaryDirectory directory;
   const auto page = [&] {
-    write_performance_page(directory.path / "page.html", performer, signals, retarget::perform(performer, signals, options), {});
+    write_performance_page(directory.path / "page.html", performer, {}, signals, retarget::perform(performer, signals, options), {});
     return read_file(directory.path / "page.html");
   };
   const std::string all = page();

@@ -3,11 +3,32 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 namespace hydrostat::io {
+
+/// Collects binary data and the JSON that describes it.
+struct GltfBuffer {
+  std::string bytes;
+  nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array();
+
+  template <typename Number>
+  int add(const std::vector<Number>& numbers, int component_type, const char* type, std::size_t width,
+          bool normalised = false) {
+    views.push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", numbers.size() * sizeof(Number)}});
+    bytes.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
+    bytes.resize((bytes.size() + 3) / 4 * 4);
+    accessors.push_back({{"bufferView", views.size() - 1},
+                         {"componentType", component_type},
+                         {"count", numbers.size() / width},
+                         {"type", type},
+                         {"normalized", normalised}});
+    return static_cast<int>(accessors.size()) - 1;
+  }
+};
 
 /// A strip of skin along y with two bones, "low" at the origin and "high" above it at y = 1; "high" turns about z.
 ///
@@ -28,30 +49,11 @@ struct TinyGltf {
   std::vector<int> vertices_without_weights;
   bool with_bind_matrices = true;
   bool with_skin = true;
-  float scale_of_root = 1;  // of the node above both bones
+  float scale_of_root = 1;                                              // of the node above both bones
+  std::function<void(nlohmann::json& file, GltfBuffer& buffer)> amend;  // changes the file before it is written
 
   /// Writes `directory`/tiny.gltf and tiny.bin; returns the path of the former.
   std::string write(const std::string& directory) const;
-};
-
-/// Collects binary data and the JSON that describes it.
-struct GltfBuffer {
-  std::string bytes;
-  nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array();
-
-  template <typename Number>
-  int add(const std::vector<Number>& numbers, int component_type, const char* type, std::size_t width,
-          bool normalised = false) {
-    views.push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", numbers.size() * sizeof(Number)}});
-    bytes.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
-    bytes.resize((bytes.size() + 3) / 4 * 4);
-    accessors.push_back({{"bufferView", views.size() - 1},
-                         {"componentType", component_type},
-                         {"count", numbers.size() / width},
-                         {"type", type},
-                         {"normalized", normalised}});
-    return static_cast<int>(accessors.size()) - 1;
-  }
 };
 
 inline std::string TinyGltf::write(const std::string& directory) const {
@@ -83,23 +85,24 @@ inline std::string TinyGltf::write(const std::string& directory) const {
   if (with_bind_matrices) skin["inverseBindMatrices"] = binds;
   Json body{{"name", "body"}, {"mesh", 0}};
   if (with_skin) body["skin"] = 0;
-  const Json file{{"asset", {{"version", "2.0"}}},
-                  {"scene", 0},
-                  {"scenes", {{{"nodes", {0, 3}}}}},
-                  {"nodes",
-                   {{{"name", "root"}, {"children", {1}}, {"scale", {scale_of_root, scale_of_root, scale_of_root}}},
-                    {{"name", "low"}, {"children", {2}}},
-                    {{"name", "high"}, {"translation", {0, 1, 0}}},
-                    body}},
-                  {"meshes", {{{"name", "strip"}, {"primitives", {{{"attributes", attributes}, {"indices", indices}}}}}}},
-                  {"skins", {skin}},
-                  {"animations",
-                   {{{"name", "bow"},
-                     {"samplers", {{{"input", input}, {"output", output}, {"interpolation", interpolation}}}},
-                     {"channels", {{{"sampler", 0}, {"target", {{"node", 2}, {"path", "rotation"}}}}}}}}},
-                  {"buffers", {{{"uri", "tiny.bin"}, {"byteLength", buffer.bytes.size()}}}},
-                  {"bufferViews", buffer.views},
-                  {"accessors", buffer.accessors}};
+  Json file{{"asset", {{"version", "2.0"}}},
+            {"scene", 0},
+            {"scenes", {{{"nodes", {0, 3}}}}},
+            {"nodes",
+             {{{"name", "root"}, {"children", {1}}, {"scale", {scale_of_root, scale_of_root, scale_of_root}}},
+              {{"name", "low"}, {"children", {2}}},
+              {{"name", "high"}, {"translation", {0, 1, 0}}},
+              body}},
+            {"meshes", {{{"name", "strip"}, {"primitives", {{{"attributes", attributes}, {"indices", indices}}}}}}},
+            {"skins", {skin}},
+            {"animations",
+             {{{"name", "bow"},
+               {"samplers", {{{"input", input}, {"output", output}, {"interpolation", interpolation}}}},
+               {"channels", {{{"sampler", 0}, {"target", {{"node", 2}, {"path", "rotation"}}}}}}}}}};
+  if (amend) amend(file, buffer);
+  file["buffers"] = {{{"uri", "tiny.bin"}, {"byteLength", buffer.bytes.size()}}};
+  file["bufferViews"] = buffer.views;
+  file["accessors"] = buffer.accessors;
   std::ofstream(directory + "/tiny.bin", std::ios::binary) << buffer.bytes;
   std::ofstream(directory + "/tiny.gltf") << file.dump();
   return directory + "/tiny.gltf";

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <utility>
 
 namespace hydrostat::retarget {
 namespace {
 
 constexpr double kGravity = 9.81;
+constexpr double kQuick = 3;  // times the speed of what stands: a patch that must bear holds up to here
 
 /// Runs of equal labels shorter than `least` take the label before them (round the seam of a loop too), shortest first.
 void close_short_runs(std::vector<ContactState>& states, int least, bool loop) {
@@ -27,8 +29,8 @@ void close_short_runs(std::vector<ContactState>& states, int least, bool loop) {
   }
 }
 
-/// Runs of `state` shorter than `least` become what `other` says of the states before and after; at the ends of what is no loop
-/// these are the run's own.
+/// Runs of `state` shorter than `least` become what `other` says of the states before and after; at the ends of what is no
+/// loop these are the run's own.
 void replace_runs(std::vector<ContactState>& states, ContactState state, int least, bool loop,
                   const std::function<ContactState(ContactState before, ContactState after)>& other) {
   const int count = static_cast<int>(states.size());
@@ -40,12 +42,13 @@ void replace_runs(std::vector<ContactState>& states, ContactState state, int lea
     while (f - begin < count && (loop || begin > 0) && at(begin - 1) == state) --begin;
     while (end - f < count && (loop || end < count - 1) && at(end + 1) == state) ++end;
     if (end - begin + 1 >= least) continue;
-    states[static_cast<std::size_t>(f)] = other(loop || begin > 0 ? at(begin - 1) : state, loop || end < count - 1 ? at(end + 1) : state);
+    states[static_cast<std::size_t>(f)] =
+        other(loop || begin > 0 ? at(begin - 1) : state, loop || end < count - 1 ? at(end + 1) : state);
   }
 }
 
-/// Sliding directions 2 x F as means over the sliding ones of five frames, so that friction turns round gently: where the direction
-/// turns, the mean is shorter than 1 and settles less of the friction. Zero where a patch does not slide.
+/// Sliding directions 2 x F as means over the sliding ones of five frames, so that friction turns round gently: where the
+/// direction turns, the mean is shorter than 1 and settles less of the friction. Zero where a patch does not slide.
 Eigen::MatrixXd settled_directions(const Eigen::MatrixXd& direction, const std::vector<ContactState>& states, bool loop) {
   const Eigen::Index frames = direction.cols();
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, frames);
@@ -61,6 +64,67 @@ Eigen::MatrixXd settled_directions(const Eigen::MatrixXd& direction, const std::
     mean.col(f) /= count;
   }
   return mean;
+}
+
+/// What label_contacts sees of a patch in one frame.
+struct PatchSight {
+  double height = 0;                // [m] of its lowest point
+  double sideways = 0, upward = 0;  // speeds of its low points [m/s]
+};
+using Sights = std::vector<std::vector<PatchSight>>;  // patches x F
+
+/// What a patch must keep within to bear a body that has nothing else to stand on.
+struct BearingLimits {
+  double height = 0, upward = 0, sideways = 0;  // [m], [m/s]; what is faster sideways slides
+};
+
+/// Runs of frames in which no patch touches, as first frame and length, between two frames that have contact.
+std::vector<std::pair<int, int>> gaps_of(const std::vector<std::vector<ContactState>>& states, bool loop) {
+  const int frames = static_cast<int>(states.front().size());
+  const auto flies = [&](int f) {
+    return std::all_of(states.begin(), states.end(),
+                       [&](const auto& of) { return of[static_cast<std::size_t>(f % frames)] == ContactState::kOff; });
+  };
+  std::vector<std::pair<int, int>> gaps;
+  for (int f = 0; f < frames; ++f) {
+    if (!flies(f + 1) || flies(f)) continue;
+    int length = 1;
+    while (length < frames && flies(f + 1 + length)) ++length;
+    if (loop || f + 1 + length < frames) gaps.emplace_back((f + 1) % frames, length);
+  }
+  return gaps;
+}
+
+/// A body that flies for T rises over the line between its ends by g T2 / 12 in the mean; half of that is a flight. `middle`
+/// [m] is the body's height in each frame.
+bool falls_in(const std::pair<int, int>& gap, const Eigen::VectorXd& middle, double rate_hz) {
+  const auto height = [&](int k) { return middle[(gap.first + k + middle.size()) % middle.size()]; };
+  const int steps = gap.second + 1;  // between the last frame on the ground and the next
+  const double first = height(-1), rise = height(gap.second) - first, time = steps / rate_hz;
+  double above = 0;
+  for (int k = 0; k < gap.second; ++k) above += height(k) - first - rise * (k + 1) / steps;
+  return above / steps > 0.5 * kGravity * time * time / 12;
+}
+
+/// Where nothing touches although the body does not fall, the patch bears that is lowest and slowest.
+void support_what_does_not_fall(const Eigen::VectorXd& middle, const Sights& sights, double rate_hz, bool loop,
+                                const BearingLimits& limits, std::vector<std::vector<ContactState>>& states) {
+  if (states.empty()) return;
+  for (const std::pair<int, int>& gap : gaps_of(states, loop)) {
+    if (falls_in(gap, middle, rate_hz)) continue;
+    for (int k = 0; k < gap.second; ++k) {
+      const std::size_t f = static_cast<std::size_t>((gap.first + k) % static_cast<int>(middle.size()));
+      const auto cost = [&](const std::vector<PatchSight>& sight) {
+        return sight[f].height / limits.height + sight[f].sideways / limits.sideways;
+      };
+      const auto by_cost = [&](const auto& a, const auto& b) { return cost(a) < cost(b); };
+      const std::size_t best =
+          static_cast<std::size_t>(std::min_element(sights.begin(), sights.end(), by_cost) - sights.begin());
+      const PatchSight& sight = sights[best][f];
+      if (sight.height > limits.height || sight.upward > limits.upward) continue;
+      states[best][f] = sight.sideways < limits.sideways ? ContactState::kStick : ContactState::kSlide;
+    }
+  }
 }
 
 }  // namespace
@@ -102,7 +166,8 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
   const double reach = options.height * size;
   double squared = 0;
   for (Eigen::Index f = 0; f < frames; ++f) {
-    for (Eigen::Index p = 0; p < speed.rows() / 3; ++p) squared += speed(3 * p, f) * speed(3 * p, f) + speed(3 * p + 2, f) * speed(3 * p + 2, f);
+    for (Eigen::Index p = 0; p < speed.rows() / 3; ++p)
+      squared += speed(3 * p, f) * speed(3 * p, f) + speed(3 * p + 2, f) * speed(3 * p + 2, f);
   }
   const double rms_speed = std::sqrt(squared / static_cast<double>(frames * speed.rows() / 3));
   const double wave = std::sqrt(kGravity * length);
@@ -113,9 +178,12 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
   for (std::size_t p = 0; p < bone_of_point.size(); ++p) points_of_bone[bone_of_point[p]].push_back(static_cast<int>(p));
 
   ContactSchedule schedule;
-  schedule.touching = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(static_cast<Eigen::Index>(bone_of_point.size()), frames, false);
+  schedule.touching = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(
+      static_cast<Eigen::Index>(bone_of_point.size()), frames, false);
   std::vector<Eigen::MatrixXd> directions;
+  Sights sights;
   for (const auto& [bone, members] : points_of_bone) {
+    std::vector<PatchSight> sight(static_cast<std::size_t>(frames));
     std::vector<ContactState> states(static_cast<std::size_t>(frames), ContactState::kOff);
     Eigen::MatrixXd direction = Eigen::MatrixXd::Zero(2, frames);
     ContactState previous = ContactState::kOff;
@@ -124,8 +192,8 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
         const auto x = points.at(f);
         double lowest = 1e300;
         for (const int p : members) lowest = std::min(lowest, x(1, p));
-        // Speeds of the low points towards the frame before and the one after: the first and last frame of a stance stand still
-        // on one side.
+        // Speeds of the low points towards the frame before and the one after: the first and last frame of a stance stand
+        // still on one side.
         Eigen::Vector3d before = Eigen::Vector3d::Zero(), after = before;
         int low = 0;
         for (const int p : members) {
@@ -143,21 +211,33 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
         }
         if (sideways > 0) direction.col(f) = Eigen::Vector2d(velocity.x(), velocity.z()) / sideways;
         states[static_cast<std::size_t>(f)] = previous = state;
+        sight[static_cast<std::size_t>(f)] = {lowest, sideways, std::abs(velocity.y())};
       }
     }
-    // A foot that brushes the ground on its way through is not dragged: sliding counts if it lasts. What is dragged and slow for a
-    // moment does not stand: between slides, standing counts if it lasts.
+    // A foot that brushes the ground on its way through is not dragged, and one that glides for a moment in its stance
+    // stands: sliding counts if it lasts. What is dragged and slow for a moment does not stand: between slides, standing
+    // counts if it lasts.
     const int least_run = 2 * options.least_frames + 1;
-    replace_runs(states, ContactState::kSlide, least_run, points.loop, [](ContactState, ContactState) { return ContactState::kOff; });
+    replace_runs(states, ContactState::kSlide, least_run, points.loop, [](ContactState before, ContactState after) {
+      return before == ContactState::kStick && after == ContactState::kStick ? ContactState::kStick : ContactState::kOff;
+    });
     replace_runs(states, ContactState::kStick, least_run, points.loop, [](ContactState before, ContactState after) {
       return before == ContactState::kSlide && after == ContactState::kSlide ? ContactState::kSlide : ContactState::kStick;
     });
     close_short_runs(states, options.least_frames, points.loop);
     if (std::all_of(states.begin(), states.end(), [](ContactState s) { return s == ContactState::kOff; })) continue;
-    direction = settled_directions(direction, states, points.loop);
     schedule.patches.push_back({bone_names[static_cast<std::size_t>(bone)], members});
     schedule.state.push_back(states);
     directions.push_back(direction);
+    sights.push_back(std::move(sight));
+  }
+  Eigen::VectorXd middle(frames);
+  for (Eigen::Index f = 0; f < frames; ++f) middle[f] = points.at(f).row(1).mean();
+  support_what_does_not_fall(middle, sights, points.rate_hz, points.loop,
+                             {options.support_height * length, fall, kQuick * still}, schedule.state);
+  for (std::size_t k = 0; k < directions.size(); ++k) {
+    close_short_runs(schedule.state[k], options.least_frames, points.loop);
+    directions[k] = settled_directions(directions[k], schedule.state[k], points.loop);
   }
   schedule.sliding_x.resize(static_cast<Eigen::Index>(directions.size()), frames);
   schedule.sliding_z = schedule.sliding_x;

@@ -38,6 +38,7 @@ struct ContactOptions {
   double still_speed = 0.15;   // of the RMS speed of all points: slower, to the frame before or after, sticks
   double least_still_speed = 0.02;  // of sqrt(g L)
   double fall_speed = 0.12;    // of sqrt(g L): a patch that rises or sinks faster does not touch
+  double support_height = 0.05;  // of L: a patch bears below this where nothing touches and the body does not fall
   int least_frames = 4;        // shorter contacts and gaps are closed
 };
 

@@ -1,9 +1,43 @@
 #include "retarget/root_motion.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace hydrostat::retarget {
+namespace {
+
+constexpr int kHarmonics = 2;        // of the pace in a period: one for the stride, one for its steps
+constexpr double kEvenness = 0.003;  // weight of an even pace against one frame on the ground
+
+/// The course of a loop's pace, 2 x F [m/s]: the mean and the first harmonics that fit best where something is near the ground.
+/// What remains is the feet's own sliding, which the foot lock takes. `soft` [m] is the height that counts half as ground.
+Eigen::MatrixXd smooth_pace(const Eigen::MatrixXd& ground, const Eigen::VectorXd& heights, double soft) {
+  const Eigen::Index frames = ground.cols();
+  Eigen::MatrixXd basis(frames, 1 + 2 * kHarmonics);
+  for (Eigen::Index f = 0; f < frames; ++f) {
+    basis(f, 0) = 1;
+    for (int k = 1; k <= kHarmonics; ++k) {
+      const double phase = 2 * M_PI * k * static_cast<double>(f) / static_cast<double>(frames);
+      basis(f, 2 * k - 1) = std::cos(phase);
+      basis(f, 2 * k) = std::sin(phase);
+    }
+  }
+  std::vector<double> sorted(heights.data(), heights.data() + frames);
+  std::nth_element(sorted.begin(), sorted.begin() + frames / 5, sorted.end());
+  const Eigen::ArrayXd above = (heights.array() - sorted[static_cast<std::size_t>(frames / 5)]).max(0) / soft;
+  const Eigen::VectorXd weights = (1 + above.square()).inverse();
+  Eigen::MatrixXd normal = basis.transpose() * weights.asDiagonal() * basis;
+  for (int k = 1; k <= kHarmonics; ++k) {
+    normal(2 * k - 1, 2 * k - 1) += kEvenness * k * k * static_cast<double>(frames);
+    normal(2 * k, 2 * k) += kEvenness * k * k * static_cast<double>(frames);
+  }
+  const Eigen::MatrixXd fit = normal.ldlt().solve(basis.transpose() * weights.asDiagonal() * ground.transpose());
+  return (basis * fit).transpose();
+}
+
+}  // namespace
 
 RootMotionResult recover_root_motion(const Motion& points, double length, RootMotion mode) {
   const Eigen::Index frames = points.count(), count = points.frames.rows() / 3;
@@ -25,6 +59,7 @@ RootMotionResult recover_root_motion(const Motion& points, double length, RootMo
   const Eigen::MatrixXd speed = velocities(points);
   const double soft = 0.01 * length;
   Eigen::MatrixXd ground(2, frames);
+  Eigen::VectorXd heights(frames);
   for (Eigen::Index f = 0; f < frames; ++f) {
     const auto x = points.at(f);
     const double lowest = x.row(1).minCoeff();
@@ -38,26 +73,12 @@ RootMotionResult recover_root_motion(const Motion& points, double length, RootMo
       weights += weight;
     }
     ground.col(f) = sum / weights;
+    heights[f] = lowest;
   }
   const double period = points.duration_s();
   const Eigen::Vector2d mean = ground.rowwise().mean();
   if (mode == RootMotion::kAuto && mean.norm() * period < 0.1 * length) return result;
-  if (points.loop) {
-    // A steady pace with its first harmonic: what remains is the feet's own sliding, which the foot lock takes.
-    const double pace = mean.norm();
-    double cosine = 0, sine = 0;
-    const auto phase_of = [&](Eigen::Index f) { return 2 * M_PI * static_cast<double>(f) / static_cast<double>(frames); };
-    const auto along = [&](Eigen::Index f) { return pace > 0 ? (mean.x() * ground(0, f) + mean.y() * ground(1, f)) / pace : 0; };
-    for (Eigen::Index f = 0; f < frames; ++f) {
-      cosine += along(f) * std::cos(phase_of(f)) * 2 / static_cast<double>(frames);
-      sine += along(f) * std::sin(phase_of(f)) * 2 / static_cast<double>(frames);
-    }
-    for (Eigen::Index f = 0; f < frames; ++f) {
-      const double change = pace > 0 ? (cosine * std::cos(phase_of(f)) + sine * std::sin(phase_of(f))) / pace : 0;
-      ground(0, f) = mean.x() * (1 + change);
-      ground(1, f) = mean.y() * (1 + change);
-    }
-  }
+  if (points.loop) ground = smooth_pace(ground, heights, soft);
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
   for (Eigen::Index f = 0; f < frames; ++f) {
     result.offset.col(f) = place;

@@ -22,6 +22,6 @@ if [ ! -f "$HYDROSTAT_ASSETS/golden_bbox.json" ]; then
   left_out="Tests on third-party clips were left out: there are none in $HYDROSTAT_ASSETS (set HYDROSTAT_ASSETS)."
 fi
 [ -z "${left_out:-}" ] || echo "$left_out"
-long='^(Steppers|Contact|Guard|Euler|Explicit|ElementSteppers)[.].*3d|RollsABall'
+long='^ElementSteppers[.].*3d|RollsABall'
 ctest --preset dev -L unit "${which[@]}" -E "$long" -j "$jobs"
 ctest --preset release "${which[@]}" -j "$jobs"

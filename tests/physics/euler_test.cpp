@@ -12,7 +12,7 @@ constexpr double kDt = 1.0 / 240;
 
 template <typename Dimension>
 class Euler : public testing::Test {};
-TYPED_TEST_SUITE(Euler, BothDimensions, DimensionName);
+TYPED_TEST_SUITE(Euler, SimulatedDimensions, DimensionName);
 
 TYPED_TEST(Euler, LosesAngularMomentumInFreeFlightAndHidesNoneOfIt) {
   constexpr int Dim = TypeParam::kDim;

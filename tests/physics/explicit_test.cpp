@@ -18,7 +18,7 @@ StateOf<Dim> tumbling(const BodyOf<Dim>& body, unsigned seed) {
 
 template <typename Dimension>
 class Explicit : public testing::Test {};
-TYPED_TEST_SUITE(Explicit, BothDimensions, DimensionName);
+TYPED_TEST_SUITE(Explicit, SimulatedDimensions, DimensionName);
 
 TYPED_TEST(Explicit, KeepsAngularMomentumInFreeFlightWhateverTheActivation) {
   constexpr int Dim = TypeParam::kDim;

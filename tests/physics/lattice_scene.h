@@ -8,6 +8,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <type_traits>
 #include <vector>
 
 #include "physics/elastic_forces.h"
@@ -272,6 +273,8 @@ struct InDimension {
   static constexpr int kDim = D;
 };
 using BothDimensions = testing::Types<InDimension<2>, InDimension<3>>;
+/// For simulations: the sanitizers see the same sources in the plane.
+using SimulatedDimensions = std::conditional_t<kSanitized, testing::Types<InDimension<2>>, BothDimensions>;
 struct DimensionName {
   template <typename Type>
   static std::string GetName(int) {

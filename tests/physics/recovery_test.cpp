@@ -28,7 +28,7 @@ class Idle final : public StepperOf<Dim> {
 
 template <typename Dimension>
 class Recovery : public testing::Test {};
-TYPED_TEST_SUITE(Recovery, BothDimensions, DimensionName);
+TYPED_TEST_SUITE(Recovery, SimulatedDimensions, DimensionName);
 
 /// Nodes anywhere in a box of a metre, turning and drifting.
 template <int Dim>

@@ -129,6 +129,33 @@ TEST(LabelContacts, KeepsTheirContactLongerThanTheyTakeIt) {
   EXPECT_TRUE(label(head_and_foot([&](Eigen::Index) { return Eigen::Vector2d(0, between); }, false)).patches.empty());
 }
 
+/// Down in frames 0 to 19, and 30 mm above the ground in the others, while the head rises over its way by `share` of what free
+/// fall for that time would have it rise.
+Motion hovering_foot(double share) {
+  Motion motion = head_and_foot([](Eigen::Index f) { return Eigen::Vector2d(0, f < 20 ? 0 : 0.03); });
+  for (Eigen::Index f = 20; f < kFrames; ++f) {
+    const double left = static_cast<double>(f - 19) / 60, right = static_cast<double>(kFrames - f) / 60;
+    motion.at(f)(1, 0) += 3 * share * 0.5 * 9.81 * left * right;  // three points make the middle, the head is one
+  }
+  return motion;
+}
+
+TEST(LabelContacts, WhatDoesNotFallStandsOnItsLowestFoot) {
+  EXPECT_EQ(frames_in(label(hovering_foot(0)), kOff), 0);
+  EXPECT_EQ(frames_in(label(hovering_foot(0.3)), kOff), 0);
+  EXPECT_GE(frames_in(label(hovering_foot(1)), kOff), kFrames - 20 - 2) << "free fall is a flight";
+  ContactOptions strict;
+  strict.support_height = 0.02;
+  EXPECT_GE(frames_in(label(hovering_foot(0), strict), kOff), kFrames - 20 - 2) << "a foot that far up bears nothing";
+}
+
+TEST(LabelContacts, AFootThatGlidesForAMomentInItsStanceStands) {
+  const ContactSchedule contacts = label(head_and_foot([](Eigen::Index f) {
+    return Eigen::Vector2d(0.02 * static_cast<double>(std::clamp<Eigen::Index>(f - 30, 0, 6)), f < 55 ? 0 : 0.2);
+  }));
+  for (std::size_t f = 2; f < 53; ++f) EXPECT_EQ(contacts.state[0][f], kStick) << "frame " << f;
+}
+
 TEST(GroundHeight, IsTheLevelOfTheLowestPoints) {
   for (const double level : {-0.3, 0.0, 1.7}) {
     // On the ground for half of the time, and once below it by mistake.

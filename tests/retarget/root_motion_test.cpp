@@ -56,6 +56,30 @@ TEST(RecoverRootMotion, FindsTheSpeedOfATreadmill) {
   }
 }
 
+TEST(RecoverRootMotion, FollowsAPaceThatChangesWithEachStep) {
+  // Two feet on a treadmill whose speed swings by a third twice a period: one stands while the other comes back over it.
+  Motion motion;
+  motion.loop = true;
+  motion.frames = Eigen::MatrixXd::Zero(9, kFrames);
+  const auto gone = [](double phase) { return 0.6 * phase + 0.2 * std::sin(4 * M_PI * phase) / (4 * M_PI); };
+  for (Eigen::Index f = 0; f < kFrames; ++f) {
+    for (int foot = 0; foot < 2; ++foot) {
+      double own = static_cast<double>(f) / kFrames + 0.5 * foot;
+      own -= std::floor(own);
+      const double back = 2 * own - 1;
+      motion.at(f).col(foot) << (own < 0.5 ? -gone(own) : -gone(0.5) * (1 - back)), own < 0.5 ? 0 : 0.1 * std::sin(M_PI * back), 0.1 * foot;
+    }
+    motion.at(f).col(2) << 0, 1, 0;
+  }
+  const RootMotionResult result = recover_root_motion(motion, 1, RootMotion::kFromFeet);
+  for (Eigen::Index f = 0; f < kFrames; ++f) {
+    // What goes beyond an even pace: 0.016 m at most.
+    const double phase = static_cast<double>(f) / kFrames;
+    EXPECT_NEAR(result.offset(0, f) - result.travel.x() * phase, gone(phase) - 0.6 * phase, 0.01) << "frame " << f;
+  }
+  EXPECT_NEAR(result.travel.x(), 0.6, 0.06) << "where the feet change, swing and stance are one";
+}
+
 TEST(RecoverRootMotion, LeavesATravellingClipAlone) {
   for (const RootMotion mode : {RootMotion::kAuto, RootMotion::kKeep}) {
     const RootMotionResult result = recover_root_motion(walk({0.5, 0, 0.2}, 1), 1, mode);

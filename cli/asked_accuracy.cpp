@@ -104,6 +104,8 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
   rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
   const int last = static_cast<int>(rows.size()) - 1;
+  chosen.finest_setting = finest;
+  chosen.finest_row = last;
   chosen.setting = finest;  // where nothing cheaper will do
   chosen.curve.recommended = last;
   double error_m = rows.back().error_rms_m;
@@ -128,6 +130,18 @@ template ChosenStep choose_step<2>(const AskedAccuracy&, const std::string&, con
                                    std::optional<physics::Method>);
 template ChosenStep choose_step<3>(const AskedAccuracy&, const std::string&, const retarget::ReferenceOf<3>&,
                                    std::optional<physics::Method>);
+
+bool take_finest(ChosenStep& chosen, std::vector<std::string>& warnings) {
+  if (chosen.finest_row < 0 || chosen.curve.recommended == chosen.finest_row) return false;
+  warnings.push_back("accuracy: by the cheapest setting within the error, '" + physics::name_of(chosen.setting.method) +
+                     "', the creature fell in the end; the finest that was tried is taken");
+  chosen.setting = chosen.finest_setting;
+  chosen.curve.recommended = chosen.finest_row;
+  chosen.report.estimated_error_length =
+      chosen.curve.rows[static_cast<std::size_t>(chosen.finest_row)].error_rel_length + chosen.curve.floor;
+  chosen.report.work_saved = 0;
+  return true;
+}
 
 void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting) {
   options.method = setting.method;

@@ -26,6 +26,8 @@ struct ChosenStep {
   io::AccuracyCurve curve;                            // of what was tried, the chosen one marked
   std::optional<retarget::ReferenceOf<3>> reference;  // of a creature
   std::optional<retarget::Replay> finest;             // likewise: its closed loop in steps finer than any choice
+  retarget::StepSetting finest_setting;               // of it
+  int finest_row = -1;
 };
 /// A creature's steps are whole parts of it.
 constexpr double kControlSeconds = 1.0 / 120;
@@ -39,6 +41,10 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
 /// has to stay up where the finest does.
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::Performer& performer,
                        const retarget::SignalSet& signals, std::optional<physics::Method> only);
+
+/// Takes the finest setting instead, for what was chosen fell in the end, and says so in a warning; false where it is the
+/// choice already. The signals have to be whole again then.
+bool take_finest(ChosenStep& chosen, std::vector<std::string>& warnings);
 
 /// Steps of a replay, whose control takes kControlSeconds.
 void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting);

@@ -349,10 +349,12 @@ class Conversion {
 
   void let_go() {
     perform();
-    if (!chosen_ || !is_down(performances_.main()) || !take_finest(*chosen_, target_.report.warnings)) return;
-    signals_ = whole_signals_;
-    tell_signals();
-    perform();
+    while (chosen_ && is_down(performances_.main()) &&
+           take_next(*chosen_, target_.performer, whole_signals_, target_.report.warnings)) {
+      signals_ = whole_signals_;
+      tell_signals();
+      perform();
+    }
   }
 
   void perform() {

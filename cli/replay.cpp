@@ -128,7 +128,8 @@ int replay(const ReplayCommand& command) {
     return stages.run("replay", [&] { return retarget::perform(performer, creature.signals, options); });
   };
   retarget::Performances performances = perform();
-  if (chosen && !command.open_loop && is_down(performances.main()) && take_finest(*chosen, creature.target.report.warnings)) {
+  while (chosen && !command.open_loop && is_down(performances.main()) &&
+         take_next(*chosen, performer, creature.signals, creature.target.report.warnings)) {
     take_steps(options.replay, chosen->setting);
     performances = perform();
   }

@@ -56,6 +56,26 @@ double closed_loop_error(const retarget::Replay& finest, const retarget::Perform
   return retarget::skin_distance(performer, finest.motion, replay.motion);
 }
 
+/// The first of the candidates from the present one on whose closed loop stays near the finest one's, and up; the finest at
+/// the latest.
+void take_candidate(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals) {
+  const double floor_m = chosen.reference->uncertainty_m();
+  const double most_m = chosen.report.max_error_length * performer.length - floor_m;
+  const std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
+  const retarget::AccuracyRow& finest = rows[static_cast<std::size_t>(chosen.candidates.back())];
+  for (;; ++chosen.candidate) {
+    chosen.curve.recommended = chosen.candidates[chosen.candidate];
+    const retarget::AccuracyRow& row = rows[static_cast<std::size_t>(chosen.curve.recommended)];
+    chosen.setting = {*physics::method_named(row.method), row.dt_s};
+    double error_m = row.error_rms_m;
+    const bool is_last = chosen.candidate + 1 == chosen.candidates.size();
+    if (!is_last) error_m = std::max(error_m, closed_loop_error(*chosen.finest, performer, signals, chosen.setting));
+    chosen.report.estimated_error_length = (error_m + floor_m) / performer.length;
+    chosen.report.work_saved = 1 - row.work_ms / finest.work_ms;
+    if (is_last || error_m <= most_m) return;
+  }
+}
+
 }  // namespace
 
 double AskedAccuracy::most(const std::string& command) const {
@@ -98,30 +118,29 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options);
   ChosenStep chosen = choose_step(asked, command, reference, only);
   if (!chosen.report.is_met()) return chosen;
-  const retarget::StepSetting finest{reference.setting.method, kFinestSeconds};
+  const retarget::StepSetting finest{only.value_or(reference.setting.method), kFinestSeconds};
   chosen.finest = closed_loop(performer, signals, finest);
-  const double most_m = chosen.report.max_error_length * performer.length - reference.uncertainty_m();
   std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
   rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
   const int last = static_cast<int>(rows.size()) - 1;
-  chosen.setting = finest;  // where nothing cheaper will do
-  chosen.curve.recommended = last;
-  double error_m = rows.back().error_rms_m;
-  for (const int k : by_work(rows, most_m)) {
+  for (const int k : by_work(rows, chosen.report.max_error_length * performer.length - reference.uncertainty_m())) {
     if (k == last) break;
-    const retarget::AccuracyRow& row = rows[static_cast<std::size_t>(k)];
-    const retarget::StepSetting setting{*physics::method_named(row.method), row.dt_s};
-    const double found_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, signals, setting));
-    if (found_m > most_m) continue;
-    chosen.setting = setting;
-    chosen.curve.recommended = k;
-    error_m = found_m;
-    break;
+    chosen.candidates.push_back(k);
   }
-  chosen.report.estimated_error_length = (error_m + reference.uncertainty_m()) / performer.length;
-  chosen.report.work_saved = 1 - rows[static_cast<std::size_t>(chosen.curve.recommended)].work_ms / rows.back().work_ms;
+  chosen.candidates.push_back(last);
   chosen.reference = reference;
+  take_candidate(chosen, performer, signals);
   return chosen;
+}
+
+bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals,
+               std::vector<std::string>& warnings) {
+  if (chosen.candidate + 1 >= chosen.candidates.size()) return false;
+  warnings.push_back("accuracy: by '" + physics::name_of(chosen.setting.method) +
+                     "', which does less work within the error, the creature fell in the end");
+  ++chosen.candidate;
+  take_candidate(chosen, performer, signals);
+  return true;
 }
 
 template ChosenStep choose_step<2>(const AskedAccuracy&, const std::string&, const retarget::ReferenceOf<2>&,

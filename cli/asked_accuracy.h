@@ -26,6 +26,8 @@ struct ChosenStep {
   io::AccuracyCurve curve;                            // of what was tried, the chosen one marked
   std::optional<retarget::ReferenceOf<3>> reference;  // of a creature
   std::optional<retarget::Replay> finest;             // likewise: its closed loop in steps finer than any choice
+  std::vector<int> candidates;                        // rows within the error, least work first, the finest at the end
+  std::size_t candidate = 0;                          // that is chosen
 };
 /// A creature's steps are whole parts of it.
 constexpr double kControlSeconds = 1.0 / 120;
@@ -39,6 +41,11 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
 /// has to stay up where the finest does.
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::Performer& performer,
                        const retarget::SignalSet& signals, std::optional<physics::Method> only);
+
+/// Takes the next candidate, for what was chosen fell in the end, and says so in a warning; false where there is none.
+/// `signals` are whole again.
+bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals,
+               std::vector<std::string>& warnings);
 
 /// Steps of a replay, whose control takes kControlSeconds.
 void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting);

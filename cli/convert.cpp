@@ -335,16 +335,31 @@ class Conversion {
     stages_.run("accuracy", [&] {
       const std::optional<physics::Method> only = options_.method == "auto" ? std::nullopt : std::optional(settings_.method);
       chosen_ = choose_step(options_.accuracy, "hydrostat convert", target_.performer, signals_, only);
+      whole_signals_ = signals_;
       cut_harmonics(*chosen_, target_.performer, signals_);
-      target_.report.signals = signals_report(signals_);
-      target_.report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
-      signals_text_ = io::signals_text(signals_);
-      target_file_ = io::target_bytes(target_);
       return 0;
     });
+    tell_signals();
+  }
+
+  void tell_signals() {
+    target_.report.signals = signals_report(signals_);
+    target_.report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
+    signals_text_ = io::signals_text(signals_);
+    target_file_ = io::target_bytes(target_);
   }
 
   void let_go() {
+    perform();
+    while (chosen_ && is_down(performances_.main()) &&
+           take_next(*chosen_, target_.performer, whole_signals_, target_.report.warnings)) {
+      signals_ = whole_signals_;
+      tell_signals();
+      perform();
+    }
+  }
+
+  void perform() {
     retarget::PerformOptions perform_options;
     perform_options.replay.method = settings_.method;
     if (chosen_) take_steps(perform_options.replay, chosen_->setting);
@@ -389,7 +404,7 @@ class Conversion {
   retarget::ImportedMotion motion_;
   retarget::InverseDynamics inverse_;
   io::PerformedTarget target_;
-  retarget::SignalSet signals_;
+  retarget::SignalSet signals_, whole_signals_;  // the latter before an accuracy cut them
   std::optional<ChosenStep> chosen_;
   retarget::Performances performances_;
   io::Appearance appearance_;

@@ -125,8 +125,15 @@ int replay(const ReplayCommand& command) {
   std::optional<io::CreatureWriter> writer;
   if (command.out.empty()) writer.emplace(command.directory, io::CreatureWriter::Start::amended);
 
-  const retarget::Performances performances =
-      stages.run("replay", [&] { return retarget::perform(performer, creature.signals, options); });
+  const auto perform = [&] {
+    return stages.run("replay", [&] { return retarget::perform(performer, creature.signals, options); });
+  };
+  retarget::Performances performances = perform();
+  while (chosen && !command.open_loop && is_down(performances.main()) &&
+         take_next(*chosen, performer, creature.signals, creature.target.report.warnings)) {
+    take_steps(options.replay, chosen->setting);
+    performances = perform();
+  }
   if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
   const bool is_met = !chosen || chosen->report.is_met();
   if (!writer) {

@@ -197,6 +197,10 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
     svg += "<text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" + number(kTop + 14 + 16 * static_cast<double>(m)) +
            "\" fill=\"" + colour_of(methods[m]) + "\">&#9679; " + methods[m] + "</text>\n";
   }
+  const double below = kTop + 30 + 16 * static_cast<double>(methods.size());
+  svg += "<text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" + number(below) +
+         "\" fill=\"#666\">&#9679; tets, triangles</text><text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" +
+         number(below + 16) + "\" fill=\"#666\">&#9675; hexahedra, quads</text>\n";
   return svg + "</svg>\n";
 }
 

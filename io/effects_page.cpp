@@ -9,7 +9,7 @@ using retarget::EffectRow;
 
 namespace {
 
-constexpr double kWidth = 760, kLabel = 100, kBar = 230, kLine = 24, kTop = 70;  // [px]
+constexpr double kWidth = 760, kLabel = 100, kBar = 190, kLine = 24, kTop = 86, kGap = 150;  // [px]
 
 std::string number(double value, int digits = 3) {
   char text[40];
@@ -57,15 +57,17 @@ std::string effects_svg(const std::string& subject, const std::vector<EffectRow>
       "<text x=\"8\" y=\"20\" font-size=\"14\" font-weight=\"bold\">What each effect costs and does: " +
       escaped(subject) +
       "</text>\n<text x=\"8\" y=\"38\">Each effect alone, and all together: a long bar on the left that has none on the "
-      "right is time for nothing. A body without volume or damping may need the guard.</text>\n<text x=\"" +
-      number(kLabel) + "\" y=\"58\">processor time [ms for a simulated second]</text><text x=\"" +
-      number(kLabel + kBar + 70) + "\" y=\"58\">motion's difference to none [% of L, RMS]</text>\n";
+      "right is time for nothing.</text>\n<text x=\"8\" y=\"53\">Where a body without volume or damping turns elements "
+      "inside out "
+      "the guard steps in, which takes time of its own.</text>\n<text x=\"" +
+      number(kLabel) + "\" y=\"76\">processor time [ms for a simulated second]</text><text x=\"" +
+      number(kLabel + kBar + kGap) + "\" y=\"76\">motion's difference to none [% of L, RMS]</text>\n";
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double y = kTop + kLine * static_cast<double>(k);
     svg += "<text x=\"" + number(kLabel - 6) + "\" y=\"" + number(y + 11) + "\" text-anchor=\"end\">" + rows[k].effect +
            "</text>" +
            bar(kLabel, y, rows[k].ms_per_sim_s / most_ms, "#1f6fb4", number(rows[k].ms_per_sim_s) + guarded(rows[k])) +
-           bar(kLabel + kBar + 70, y, rows[k].difference_length / most_difference, "#d2691e",
+           bar(kLabel + kBar + kGap, y, rows[k].difference_length / most_difference, "#d2691e",
                number(100 * rows[k].difference_length)) +
            "\n";
   }

@@ -5,7 +5,7 @@ const kUnits = [
   ['_l0', 100, '% l0'], ['_mgl', 1, 'mgL'], ['_mg', 1, 'mg'], ['_deg_per_cycle', 1, 'deg'], ['_m_s', 1, 'm/s'], ['_kg', 1, 'kg'], ['_pa', 1, 'Pa'],
   ['_hz', 1, 'Hz'], ['_ms_per_sim_s', 1, 'ms/s'], ['_time_factor', 1, '×'], ['_m', 1, 'm'], ['_s', 1, 's'],
 ];
-const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_end', 'volume_error_rms', 'correction_rms']);
+const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_end', 'volume_error_rms', 'correction_rms', 'work_saved']);
 const kNames = {
   clip_shape_rms_length: 'shape against the imported clip', shape_rms_length: 'shape against the target',
   world_rms_length: 'position against the target', drift_per_cycle_length: 'drift a cycle', heading_deg_per_cycle: 'heading a cycle',

@@ -342,6 +342,25 @@ TEST(Convert, MakesCreaturesOfFiniteElementsThatReplayAsTheyWere) {
   }
 }
 
+/// Small errors of short windows add up: what keeps within them has to keep its feet too, where the finest setting does.
+TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "creature";
+  const Outcome outcome = convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--max-error 2%");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json report = report_of(creature), accuracy = report["accuracy"];
+  EXPECT_EQ(accuracy["max_error_length"], 0.02);
+  EXPECT_LE(accuracy["estimated_error_length"], 0.02);
+  EXPECT_GT(accuracy["work_saved"], 0);
+  EXPECT_FALSE(report["replay"]["closed_loop"]["fell"]);
+  EXPECT_LT(report["signals"]["harmonics"], 15);  // of all
+  EXPECT_NE(io::read_file(creature / "accuracy.csv").find("harmonics"), std::string::npos);
+  EXPECT_NE(io::read_file(creature / "report.html").find("What accuracy costs: "), std::string::npos);
+  const std::string motion = motion_bytes(creature);
+  hydrostat_in(directory.path, "replay creature --quiet");
+  EXPECT_EQ(motion_bytes(creature), motion);
+}
+
 TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {
   const TemporaryDirectory directory;
   convert(directory.path, kSmallClip, "creature", kSmallOptions);

@@ -265,14 +265,21 @@ tinygltf::AnimationChannel channel(int sampler, int target, const char* path) {
   return result;
 }
 
-/// Normals that bend with the body, as targets of the mesh and their weights over time.
+/// Normals that bend with the body, as targets of the mesh and their weights over time. They tell of positions too, that
+/// these stay: three.js 0.170 cannot draw targets without.
 void add_moving_normals(tinygltf::Model& model, BufferWriter& buffer, const MovingNormals& normals, int time,
                         tinygltf::Animation& animation) {
   if (normals.targets.empty()) return;
   tinygltf::Mesh& mesh = model.meshes.front();
-  for (const std::vector<Eigen::Matrix3Xd>& target : normals.targets) {
-    for (std::size_t p = 0; p < mesh.primitives.size(); ++p)
-      add_property(buffer, "NORMAL", target[p], TINYGLTF_TYPE_VEC3, mesh.primitives[p].targets.emplace_back());
+  for (std::size_t p = 0; p < mesh.primitives.size(); ++p) {
+    const std::vector<float> nowhere(static_cast<std::size_t>(normals.targets.front()[p].size()), 0.0f);
+    const int still = buffer.array(nowhere, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
+    buffer.set_bounds(still, nowhere);
+    for (const std::vector<Eigen::Matrix3Xd>& target : normals.targets) {
+      std::map<std::string, int>& properties = mesh.primitives[p].targets.emplace_back();
+      properties["POSITION"] = still;
+      add_property(buffer, "NORMAL", target[p], TINYGLTF_TYPE_VEC3, properties);
+    }
   }
   mesh.weights.assign(normals.targets.size(), 0.0);
   tinygltf::AnimationSampler sampler;

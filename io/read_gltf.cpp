@@ -418,7 +418,15 @@ class GltfReader {
     if (mesh < 0 || static_cast<std::size_t>(mesh) >= model_.meshes.size()) return false;
     for (const tinygltf::Primitive& primitive : model_.meshes[static_cast<std::size_t>(mesh)].primitives) {
       for (const auto& target : primitive.targets) {
-        if (target.contains("POSITION")) return true;
+        const auto positions = target.find("POSITION");
+        if (positions == target.end()) continue;
+        const tinygltf::Accessor& offsets = at(model_.accessors, positions->second, "mesh");
+        const auto is_zero = [](double value) { return value == 0; };
+        const bool told_still = offsets.minValues.size() == 3 && offsets.maxValues.size() == 3;
+        if (!told_still || !std::all_of(offsets.minValues.begin(), offsets.minValues.end(), is_zero) ||
+            !std::all_of(offsets.maxValues.begin(), offsets.maxValues.end(), is_zero)) {
+          return true;
+        }
       }
     }
     return false;

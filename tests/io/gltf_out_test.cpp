@@ -258,6 +258,8 @@ TEST(WriteSkinnedGlb, NormalsBendWithTheBody) {
   write(scratch("bent"), creature);
   const tinygltf::Model model = load(scratch("bent"));
   EXPECT_LE(model.meshes[0].primitives[0].targets.size(), 8u);
+  for (const auto& target : model.meshes[0].primitives[0].targets)
+    EXPECT_TRUE(target.contains("POSITION")) << "as three.js wants";
   for (Eigen::Index f = 0; f < creature.motion.count(); ++f) {
     EXPECT_LT(normal_error(model, creature, f, true), 0.07) << "frame " << f;  // [rad]
     EXPECT_LT((play(model, static_cast<std::size_t>(f)) - creature.motion.at(f)).cwiseAbs().maxCoeff(), 2e-6);

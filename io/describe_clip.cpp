@@ -5,7 +5,10 @@
 #include <cmath>
 #include <set>
 
+#include "io/capsules.h"
 #include "io/clip_range.h"
+#include "retarget/contacts.h"
+#include "retarget/error.h"
 
 namespace hydrostat::io {
 namespace {
@@ -31,6 +34,15 @@ double lowest_of(const std::vector<Eigen::Matrix3Xd>& frames) {
   double floor = frames.front().row(1).minCoeff();
   for (const Eigen::Matrix3Xd& frame : frames) floor = std::min(floor, frame.row(1).minCoeff());
   return floor;
+}
+
+/// The ground as a conversion takes it.
+double ground_of(const std::vector<Eigen::Matrix3Xd>& frames) {
+  retarget::Motion lowest;
+  lowest.frames.setZero(3, static_cast<Eigen::Index>(frames.size()));
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    lowest.frames(1, static_cast<Eigen::Index>(f)) = frames[f].row(1).minCoeff();
+  return retarget::ground_height(lowest);
 }
 
 /// How far the low points slide in all [m]: the mean horizontal step of the points within 3 % of L of the lowest, summed.
@@ -65,7 +77,7 @@ std::vector<int> owners(const Rig& rig, Eigen::Index points) {
 
 std::vector<ContactInfo> contacts_of(const Rig& rig, const std::vector<Eigen::Matrix3Xd>& frames, double length,
                                      double range_s) {
-  const double reach = lowest_of(frames) + kContact * length;
+  const double reach = ground_of(frames) + kContact * length;
   const std::vector<int> bone_of = owners(rig, frames.front().cols());
   const std::size_t count = rig.skeleton.names.size();
   std::vector<std::vector<bool>> on(frames.size(), std::vector<bool>(count, false));
@@ -142,11 +154,31 @@ double max_strain(const Rig& rig, const std::vector<Eigen::Matrix3Xd>& frames) {
   return most;
 }
 
-void describe_travel(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range, ClipInfo& info) {
+std::vector<Eigen::Matrix3Xd> frames_of(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range) {
   std::vector<Eigen::Matrix3Xd> frames;
-  for (int f = 0; f <= kFrames; ++f) {
+  for (int f = 0; f <= kFrames; ++f)
     frames.push_back(points_at(rig, scene, clip, range.start_s + range.length_s() * f / kFrames));
+  return frames;
+}
+
+/// A skeleton alone touches the ground with the body that a conversion gives it.
+void describe_contacts(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range,
+                       const std::vector<Eigen::Matrix3Xd>& frames, double length, ClipInfo& info) {
+  if (rig.skin.vertices.cols() > 0) {
+    info.contacts = contacts_of(rig, frames, length, range.length_s());
+    return;
   }
+  Rig body = rig;
+  try {
+    add_capsules(body, "");
+  } catch (const Error&) {
+    return;  // no bone has a length
+  }
+  info.contacts = contacts_of(body, frames_of(body, scene, clip, range), length, range.length_s());
+}
+
+void describe_travel(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range, ClipInfo& info) {
+  const std::vector<Eigen::Matrix3Xd> frames = frames_of(rig, scene, clip, range);
   const Eigen::Matrix3Xd& first = frames.front();
   const double length = (first.rowwise().maxCoeff() - first.rowwise().minCoeff()).maxCoeff();
   const Eigen::Matrix3Xd shift = frames.back() - first;
@@ -159,7 +191,7 @@ void describe_travel(const Rig& rig, const Scene& scene, const SceneClip& clip, 
   info.foot_speed_m_s = slide / range.length_s();
   info.closure_defect_length = length > 0 ? defect / length : 0;
   info.max_strain = max_strain(rig, frames);
-  info.contacts = contacts_of(rig, frames, length, range.length_s());
+  describe_contacts(rig, scene, clip, range, frames, length, info);
 }
 
 }  // namespace

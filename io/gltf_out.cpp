@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "io/gltf_materials.h"
+#include "io/moving_normals.h"
 #include "io/write_file.h"
 #include "retarget/best_fit_rotation.h"
 #include "retarget/error.h"
@@ -146,11 +147,10 @@ void add_joints(BufferWriter& buffer, const retarget::Embedding& embedding, tiny
 }
 
 /// A property of the vertices; nothing where it has no columns.
-void add_property(BufferWriter& buffer, const char* name, const Eigen::Ref<const Eigen::MatrixXd>& values, int type,
-                  tinygltf::Primitive& primitive) {
+void add_property(BufferWriter& buffer, const std::string& name, const Eigen::Ref<const Eigen::MatrixXd>& values, int type,
+                  std::map<std::string, int>& properties) {
   if (values.cols() == 0) return;
-  primitive.attributes[name] =
-      buffer.array(floats(values), TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, type);
+  properties[name] = buffer.array(floats(values), TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, type);
 }
 
 void add_triangles(BufferWriter& buffer, const Eigen::Matrix3Xi& triangles, tinygltf::Primitive& primitive) {
@@ -166,23 +166,24 @@ tinygltf::Primitive part_of_skin(BufferWriter& buffer, const EmbeddedSkin& skin,
   embedding.nodes = skin.embedding.nodes(Eigen::all, part.vertices);
   embedding.weights = skin.embedding.weights(Eigen::all, part.vertices);
   add_positions(buffer, skin.vertices(Eigen::all, part.vertices), primitive);
+  add_property(buffer, "NORMAL", part.normals, TINYGLTF_TYPE_VEC3, primitive.attributes);
   add_joints(buffer, embedding, primitive);
-  add_property(buffer, "NORMAL", part.normals, TINYGLTF_TYPE_VEC3, primitive);
-  add_property(buffer, "TANGENT", part.tangents, TINYGLTF_TYPE_VEC4, primitive);
+  add_property(buffer, "TANGENT", part.tangents, TINYGLTF_TYPE_VEC4, primitive.attributes);
   for (std::size_t set = 0; set < part.uvs.size(); ++set)
-    add_property(buffer, ("TEXCOORD_" + std::to_string(set)).c_str(), part.uvs[set], TINYGLTF_TYPE_VEC2, primitive);
-  add_property(buffer, "COLOR_0", part.colours, TINYGLTF_TYPE_VEC4, primitive);
+    add_property(buffer, "TEXCOORD_" + std::to_string(set), part.uvs[set], TINYGLTF_TYPE_VEC2, primitive.attributes);
+  add_property(buffer, "COLOR_0", part.colours, TINYGLTF_TYPE_VEC4, primitive.attributes);
   add_triangles(buffer, part.triangles, primitive);
   return primitive;
 }
 
-tinygltf::Primitive plain_skin(BufferWriter& buffer, const EmbeddedSkin& skin) {
-  tinygltf::Primitive primitive;
-  add_positions(buffer, skin.vertices, primitive);
-  add_property(buffer, "NORMAL", vertex_normals(skin.vertices, skin.triangles), TINYGLTF_TYPE_VEC3, primitive);
-  add_joints(buffer, skin.embedding, primitive);
-  add_triangles(buffer, skin.triangles, primitive);
-  return primitive;
+/// The appearance's parts, or all of the skin as one smooth part.
+std::vector<Appearance::Part> parts_of(const EmbeddedSkin& skin) {
+  if (skin.appearance != nullptr && !skin.appearance->parts.empty()) return skin.appearance->parts;
+  Appearance::Part whole;
+  whole.vertices = Eigen::VectorXi::LinSpaced(skin.vertices.cols(), 0, static_cast<int>(skin.vertices.cols()) - 1);
+  whole.triangles = skin.triangles;
+  whole.normals = vertex_normals(skin.vertices, skin.triangles);
+  return {whole};
 }
 
 /// What skin without a material looks like.
@@ -196,14 +197,21 @@ tinygltf::Material plain_material(const GltfOptions& options) {
   return material;
 }
 
-void add_parts(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin, const GltfOptions& options,
-               tinygltf::Mesh& mesh) {
+void add_materials(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin) {
+  if (skin.appearance == nullptr) return;
   std::vector<int> image_views;
   for (const Image& image : skin.appearance->images)
     image_views.push_back(buffer.view(std::vector<char>(image.bytes.begin(), image.bytes.end()), 0));
   write_materials(*skin.appearance, image_views, model);
+}
+
+void add_mesh(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin,
+              const std::vector<Appearance::Part>& parts, const GltfOptions& options) {
+  tinygltf::Mesh mesh;
+  mesh.name = options.name;
+  add_materials(model, buffer, skin);
   int plain = -1;
-  for (const Appearance::Part& part : skin.appearance->parts) {
+  for (const Appearance::Part& part : parts) {
     if (part.material < 0 && plain < 0) {
       plain = static_cast<int>(model.materials.size());
       tinygltf::Material material = plain_material(options);
@@ -211,21 +219,8 @@ void add_parts(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin&
       if (part.colours.size() > 0) material.pbrMetallicRoughness.baseColorFactor.assign(4, 1);
       model.materials.push_back(std::move(material));
     }
-    tinygltf::Primitive primitive = part_of_skin(buffer, skin, part);
-    primitive.material = part.material < 0 ? plain : part.material;
-    mesh.primitives.push_back(std::move(primitive));
-  }
-}
-
-void add_mesh(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin, const GltfOptions& options) {
-  tinygltf::Mesh mesh;
-  mesh.name = options.name;
-  if (skin.appearance != nullptr && !skin.appearance->parts.empty()) {
-    add_parts(model, buffer, skin, options, mesh);
-  } else {
-    mesh.primitives.push_back(plain_skin(buffer, skin));
-    mesh.primitives.front().material = 0;
-    model.materials.push_back(plain_material(options));
+    mesh.primitives.push_back(part_of_skin(buffer, skin, part));
+    mesh.primitives.back().material = part.material < 0 ? plain : part.material;
   }
   model.meshes.push_back(std::move(mesh));
 }
@@ -270,7 +265,33 @@ tinygltf::AnimationChannel channel(int sampler, int target, const char* path) {
   return result;
 }
 
-void add_animation(tinygltf::Model& model, BufferWriter& buffer, const retarget::ControlMesh& body,
+/// Normals that bend with the body, as targets of the mesh and their weights over time. They tell of positions too, that
+/// these stay: three.js 0.170 cannot draw targets without.
+void add_moving_normals(tinygltf::Model& model, BufferWriter& buffer, const MovingNormals& normals, int time,
+                        tinygltf::Animation& animation) {
+  if (normals.targets.empty()) return;
+  tinygltf::Mesh& mesh = model.meshes.front();
+  for (std::size_t p = 0; p < mesh.primitives.size(); ++p) {
+    const std::vector<float> nowhere(static_cast<std::size_t>(normals.targets.front()[p].size()), 0.0f);
+    const int still = buffer.array(nowhere, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
+    buffer.set_bounds(still, nowhere);
+    for (const std::vector<Eigen::Matrix3Xd>& target : normals.targets) {
+      std::map<std::string, int>& properties = mesh.primitives[p].targets.emplace_back();
+      properties["POSITION"] = still;
+      add_property(buffer, "NORMAL", target[p], TINYGLTF_TYPE_VEC3, properties);
+    }
+  }
+  mesh.weights.assign(normals.targets.size(), 0.0);
+  tinygltf::AnimationSampler sampler;
+  sampler.input = time;
+  sampler.output = buffer.array(floats(normals.weights), 0, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR);
+  sampler.interpolation = "LINEAR";
+  animation.samplers.push_back(sampler);
+  animation.channels.push_back(channel(static_cast<int>(animation.samplers.size()) - 1, 0, "weights"));
+}
+
+void add_animation(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin,
+                   const std::vector<Appearance::Part>& parts, const retarget::ControlMesh& body,
                    const Eigen::Ref<const Eigen::VectorXd>& mass, const retarget::Motion& motion,
                    const GltfOptions& options) {
   const auto frames = static_cast<std::size_t>(motion.count());
@@ -279,8 +300,9 @@ void add_animation(tinygltf::Model& model, BufferWriter& buffer, const retarget:
   const int time = buffer.array(times, 0, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR);
   buffer.set_bounds(time, times);
 
+  const std::vector<Eigen::Quaterniond> rotations = retarget::best_fit_rotations(body.nodes, motion, mass);
   std::vector<float> turns;
-  for (const Eigen::Quaterniond& turn : retarget::best_fit_rotations(body.nodes, motion, mass)) {
+  for (const Eigen::Quaterniond& turn : rotations) {
     for (double part : turn.coeffs()) turns.push_back(static_cast<float>(part));  // x, y, z, w, as glTF has it
   }
   std::vector<float> paths;  // joint by joint, so that each joint's keys lie together
@@ -308,6 +330,7 @@ void add_animation(tinygltf::Model& model, BufferWriter& buffer, const retarget:
     animation.channels.push_back(channel(add_sampler(path), 2 + n, "translation"));
     animation.channels.push_back(channel(turning, 2 + n, "rotation"));
   }
+  add_moving_normals(model, buffer, fit_normals(parts, body.nodes, skin.embedding, motion, rotations), time, animation);
   model.animations.push_back(animation);
 }
 
@@ -329,9 +352,10 @@ void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& sk
   model.asset.version = "2.0";
   model.asset.generator = "hydrostat";
   BufferWriter buffer(model);
-  add_mesh(model, buffer, skin, options);
+  const std::vector<Appearance::Part> parts = parts_of(skin);
+  add_mesh(model, buffer, skin, parts, options);
   add_skeleton(model, buffer, body, options);
-  add_animation(model, buffer, body, mass, with_closing_frame(motion), options);
+  add_animation(model, buffer, skin, parts, body, mass, with_closing_frame(motion), options);
   tinygltf::Scene scene;
   scene.name = options.name;
   scene.nodes = {0, 1};

@@ -51,7 +51,8 @@ struct BoxInfo {
   Eigen::Vector3d min, max;
 };
 
-/// When a bone's skin is on the ground: within 1 % of L of the lowest point that the clip has, seen at 31 times.
+/// When a bone's skin, or the capsule that a conversion gives it, is on the ground: within 1 % of L of the height that a
+/// conversion takes for the ground, seen at 31 times.
 struct ContactInfo {
   std::string bone;                                // that moves these vertices most
   double duty = 0;                                 // share of range_s [-]

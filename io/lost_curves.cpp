@@ -1,10 +1,13 @@
 #include "io/lost_curves.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+
+#include "io/scene_pose.h"
 
 namespace hydrostat::io {
 namespace {
@@ -13,6 +16,7 @@ constexpr double kSparse = 3.5;       // frames between neighbouring keys, above
 constexpr double kSparseTurn = 8;     // [deg] between such keys
 constexpr double kSparseScale = 0.1;  // change of scale between such keys [-]
 constexpr double kDenseTurn = 24;     // [deg] between neighbouring keys of a bake
+constexpr double kSeenMiss = 0.001;   // of the skeleton's extent, half way between such keys
 
 /// The worst of a kind, and how many bones have it.
 struct Worst {
@@ -30,6 +34,56 @@ double turn_deg(const Eigen::MatrixXd& quaternions, Eigen::Index k) {
   return 2 * std::acos(dot) * 180 / std::numbers::pi;
 }
 
+using Angles = Eigen::Vector3d;  // about x, then y, then z, as FBX turns unless told otherwise
+
+Eigen::Matrix3d turned(const Angles& angles) {
+  return (Eigen::AngleAxisd(angles.z(), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(angles.y(), Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(angles.x(), Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+/// Of the angles that give a rotation those nearest to others.
+Angles angles_near(const Eigen::Matrix3d& rotation, const Angles& others) {
+  const Angles first(std::atan2(rotation(2, 1), rotation(2, 2)), std::asin(std::clamp(-rotation(2, 0), -1.0, 1.0)),
+                     std::atan2(rotation(1, 0), rotation(0, 0)));
+  const Angles second(first.x() + std::numbers::pi, std::numbers::pi - first.y(), first.z() + std::numbers::pi);
+  const auto unwound = [&](const Angles& angles) {
+    return Angles(angles - 2 * std::numbers::pi * ((angles - others).array() / (2 * std::numbers::pi)).round().matrix());
+  };
+  const Angles a = unwound(first), b = unwound(second);
+  return (a - others).norm() <= (b - others).norm() ? a : b;
+}
+
+/// The angle [rad] half way between two keys from the great arc to what straight curves of Euler angles give: none where the
+/// turn is about one of their axes.
+double miss_of_arc(const Eigen::MatrixXd& quaternions, Eigen::Index k) {
+  const Eigen::Quaterniond from(Eigen::Vector4d(quaternions.col(k))), to(Eigen::Vector4d(quaternions.col(k + 1)));
+  const Angles start = angles_near(from.toRotationMatrix(), Angles::Zero()), end = angles_near(to.toRotationMatrix(), start);
+  return Eigen::Quaterniond(turned(0.5 * (start + end))).angularDistance(from.slerp(0.5, to));
+}
+
+/// How far each node's turn reaches at rest: to the farthest joint below it [of the joints' largest extent].
+std::vector<double> reaches(const Scene& scene) {
+  const std::vector<Eigen::Affine3d> rest = node_poses(scene, nullptr, 0);
+  std::vector<double> reach(rest.size(), 0.0);
+  Eigen::AlignedBox3d box;
+  for (std::size_t n = 0; n < rest.size(); ++n) {
+    const Eigen::Vector3d place = rest[n].translation();
+    if (!scene.nodes[n].is_joint) continue;
+    box.extend(place);
+    for (int up = static_cast<int>(n); up >= 0; up = scene.nodes[static_cast<std::size_t>(up)].parent) {
+      double& farthest = reach[static_cast<std::size_t>(up)];
+      farthest = std::max(farthest, (place - rest[static_cast<std::size_t>(up)].translation()).norm());
+    }
+    // A bone at the end of its limb carries skin as far, about, as the one above it.
+    const int parent = scene.nodes[n].parent;
+    if (parent >= 0) reach[n] = std::max(reach[n], (place - rest[static_cast<std::size_t>(parent)].translation()).norm());
+  }
+  const double extent = box.isEmpty() ? 0 : box.sizes().maxCoeff();
+  for (double& each : reach) each = extent > 0 ? each / extent : 1;
+  return reach;
+}
+
 std::string others(const Worst& worst) {
   if (worst.bones < 2) return "";
   return worst.bones == 2 ? " (and another bone)" : " (and " + std::to_string(worst.bones - 1) + " other bones)";
@@ -45,6 +99,10 @@ std::string number(const char* form, double value) {
 
 std::vector<std::string> lost_curve_warnings(const Scene& scene, const SceneClip& clip, double frame_s) {
   Worst sparse, fast;
+  const std::vector<double> reach = reaches(scene);
+  // Angles that lie behind pivots are not known, and programs that write pivots curve their keys as well.
+  const bool is_plain =
+      std::all_of(scene.nodes.begin(), scene.nodes.end(), [](const SceneNode& node) { return node.parts.size() == 1; });
   for (const Channel& channel : clip.channels) {
     const std::string& name = scene.nodes[static_cast<std::size_t>(channel.node)].name;
     const auto spans = [&](const Track& track, auto&& look) {
@@ -54,7 +112,10 @@ std::vector<std::string> lost_curve_warnings(const Scene& scene, const SceneClip
     spans(channel.rotation, [&](Eigen::Index k, double span_s) {
       const double turn = turn_deg(channel.rotation.values, k);
       if (span_s > kSparse * frame_s && turn > kSparseTurn) sparse.add(span_s, span_s, name);
-      if (span_s <= kSparse * frame_s && turn > kDenseTurn) fast.add(turn, span_s, name);
+      if (span_s > kSparse * frame_s || turn <= kDenseTurn) return;
+      const double miss =
+          !is_plain ? 1 : miss_of_arc(channel.rotation.values, k) * reach[static_cast<std::size_t>(channel.node)];
+      if (miss > kSeenMiss) fast.add(turn, span_s, name);
     });
     spans(channel.scale, [&](Eigen::Index k, double span_s) {
       const double change = (channel.scale.values.col(k + 1) - channel.scale.values.col(k)).cwiseAbs().maxCoeff();

@@ -393,7 +393,8 @@ class GltfReader {
       if (channel.target_node < 0) continue;
       const std::size_t node = place(channel.target_node, where);
       const bool turns = channel.target_path == "rotation";
-      if (channel.target_path == "weights") warn_of_morphs(where, scene_.nodes[node].name);
+      if (channel.target_path == "weights" && has_moving_targets(channel.target_node))
+        warn_of_morphs(where, scene_.nodes[node].name);
       if (!turns && channel.target_path != "translation" && channel.target_path != "scale") continue;
       Track& track = turns                            ? by_node[node].rotation
                      : channel.target_path == "scale" ? by_node[node].scale
@@ -409,6 +410,26 @@ class GltfReader {
       clip.channels.push_back(std::move(by_node[n]));
     }
     scene_.clips.push_back(std::move(clip));
+  }
+
+  /// Targets may move normals alone.
+  bool has_moving_targets(int node) const {
+    const int mesh = model_.nodes[static_cast<std::size_t>(node)].mesh;
+    if (mesh < 0 || static_cast<std::size_t>(mesh) >= model_.meshes.size()) return false;
+    for (const tinygltf::Primitive& primitive : model_.meshes[static_cast<std::size_t>(mesh)].primitives) {
+      for (const auto& target : primitive.targets) {
+        const auto positions = target.find("POSITION");
+        if (positions == target.end()) continue;
+        const tinygltf::Accessor& offsets = at(model_.accessors, positions->second, "mesh");
+        const auto is_zero = [](double value) { return value == 0; };
+        const bool told_still = offsets.minValues.size() == 3 && offsets.maxValues.size() == 3;
+        if (!told_still || !std::all_of(offsets.minValues.begin(), offsets.minValues.end(), is_zero) ||
+            !std::all_of(offsets.maxValues.begin(), offsets.maxValues.end(), is_zero)) {
+          return true;
+        }
+      }
+    }
+    return false;
   }
 
   void warn_of_morphs(const std::string& clip, const std::string& node) {

@@ -27,6 +27,7 @@
 #include "io/import_worker.h"
 #include "io/scene_file.h"
 #include "io/signals_file.h"
+#include "io/stage_records.h"
 #include "io/write_file.h"
 #include "retarget/error.h"
 #include "tests/fuzz/mutate.h"
@@ -53,7 +54,8 @@ int unsound(const char* what) {
 }
 
 int check_character(const std::string& path) {
-  const retarget::Character character = io::import_character(path, "", {.limits = kLimits});
+  io::Appearance looks;
+  const retarget::Character character = io::import_character(path, "", {.limits = kLimits}, nullptr, &looks);
   if (!character.skin.vertices.allFinite()) return unsound("a vertex is not finite");
   for (const auto& frame : character.clip.bone_pose) {
     for (const Eigen::Affine3d& pose : frame) {
@@ -67,6 +69,19 @@ int check_character(const std::string& path) {
   }
   if (character.skin.triangles.size() > 0 && character.skin.triangles.maxCoeff() >= character.skin.vertices.cols()) {
     return unsound("a triangle names a vertex that is not there");
+  }
+  try {
+    io::parse_appearance(io::appearance_bytes(looks), path, character.skin.vertices.cols());
+  } catch (const Error&) {
+    return unsound("its looks do not fit its skin");
+  }
+  for (const io::Appearance::Part& part : looks.parts) {
+    for (const auto normal : part.normals.colwise()) {
+      if (!(std::abs(normal.norm() - 1) < 1e-6)) return unsound("a normal is not of length 1");
+    }
+    for (const Eigen::Matrix2Xd& uvs : part.uvs) {
+      if (!uvs.allFinite()) return unsound("a place in an image is not finite");
+    }
   }
   return kRead;
 }

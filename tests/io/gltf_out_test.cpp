@@ -9,6 +9,7 @@
 #include <fstream>
 #include <random>
 
+#include "io/read_scene.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -104,6 +105,7 @@ Eigen::Matrix3Xd play(const tinygltf::Model& model, std::size_t key, double shar
   std::vector<Eigen::Affine3d> pose(model.skins[0].joints.size());
   const tinygltf::Animation& animation = model.animations.at(0);
   for (const tinygltf::AnimationChannel& channel : animation.channels) {
+    if (channel.target_path == "weights") continue;  // of normals
     const std::vector<float> keys =
         values<float>(model, animation.samplers[static_cast<std::size_t>(channel.sampler)].output);
     const auto joint = static_cast<std::size_t>(channel.target_node - model.skins[0].joints[0]);
@@ -174,6 +176,103 @@ TEST(WriteSkinnedGlb, AllJointsTurnAsTheBodyDoesAndTheirKeysTakeTheShortWay) {
   }
 }
 
+/// A bar along x of square section whose nodes are its skin's vertices; `bend`: by how much [rad] its ends are turned to
+/// each other.
+Eigen::Matrix3Xd bent_bar(double bend) {
+  constexpr int kSections = 9;
+  Eigen::Matrix3Xd nodes(3, 4 * kSections);
+  for (int n = 0; n < nodes.cols(); ++n) {
+    const double along = n / 4 / (kSections - 1.0) - 0.5, up = 0.1 * (n / 2 % 2) - 0.05, aside = 0.1 * (n % 2) - 0.05;
+    const double angle = bend * along, radius = std::abs(bend) > 1e-9 ? 1 / bend : 0;
+    nodes.col(n) = radius == 0
+                       ? Eigen::Vector3d(along, up, aside)
+                       : Eigen::Vector3d((radius + up) * std::sin(angle), (radius + up) * std::cos(angle) - radius, aside);
+  }
+  return nodes;
+}
+
+Creature bar(const std::vector<double>& bends) {
+  Creature creature;
+  creature.body.nodes = creature.vertices = bent_bar(0);
+  const Eigen::Index count = creature.vertices.cols();
+  creature.mass = Eigen::VectorXd::Ones(count);
+  creature.embedding.nodes = Eigen::Matrix4Xi::Zero(4, count);
+  creature.embedding.nodes.row(0) = Eigen::RowVectorXi::LinSpaced(count, 0, static_cast<int>(count) - 1);
+  creature.embedding.weights = Eigen::Matrix4Xd::Zero(4, count);
+  creature.embedding.weights.row(0).setOnes();
+  std::vector<int> corners;
+  const int ring[] = {0, 1, 3, 2, 0};
+  for (int n = 0; n + 4 < count; n += 4) {
+    for (int k = 0; k < 4; ++k) {
+      const int a = n + ring[k], b = n + ring[k + 1];
+      corners.insert(corners.end(), {a, b, a + 4, b, b + 4, a + 4});
+    }
+  }
+  creature.triangles = Eigen::Map<const Eigen::Matrix3Xi>(corners.data(), 3, static_cast<Eigen::Index>(corners.size()) / 3);
+  creature.motion.rate_hz = 30;
+  creature.motion.frames.resize(3 * count, static_cast<Eigen::Index>(bends.size()));
+  for (std::size_t f = 0; f < bends.size(); ++f) {
+    const Eigen::AngleAxisd turn(0.3 * static_cast<double>(f), Eigen::Vector3d::UnitY());
+    creature.motion.at(static_cast<Eigen::Index>(f)) = turn.toRotationMatrix() * bent_bar(bends[f]);
+  }
+  return creature;
+}
+
+Eigen::Matrix3Xd surface_normals(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix3Xi& triangles) {
+  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, vertices.cols());
+  for (const auto corners : triangles.colwise()) {
+    const Eigen::Vector3d a = vertices.col(corners[0]);
+    for (const int corner : corners)
+      normals.col(corner) += (vertices.col(corners[1]) - a).cross(vertices.col(corners[2]) - a);
+  }
+  return normals.colwise().normalized();
+}
+
+/// Angle [rad, RMS over the vertices] between the normals that an engine shows in a frame and those of the moved surface.
+double normal_error(const tinygltf::Model& model, const Creature& creature, Eigen::Index frame, bool with_targets) {
+  const tinygltf::Primitive& primitive = model.meshes[0].primitives[0];
+  const auto normals_at = [&](int accessor) {
+    const std::vector<float> numbers = values<float>(model, accessor);
+    return Eigen::Matrix3Xd(Eigen::Map<const Eigen::Matrix3Xf>(numbers.data(), 3, creature.vertices.cols()).cast<double>());
+  };
+  Eigen::Matrix3Xd normals = normals_at(primitive.attributes.at("NORMAL"));
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  for (const tinygltf::AnimationChannel& channel : model.animations[0].channels) {
+    const int output = model.animations[0].samplers[static_cast<std::size_t>(channel.sampler)].output;
+    if (channel.target_path == "rotation")
+      turn = Eigen::Map<const Eigen::Quaternionf>(&values<float>(model, output)[4 * static_cast<std::size_t>(frame)])
+                 .cast<double>();
+    if (channel.target_path != "weights" || !with_targets) continue;
+    const std::size_t targets = primitive.targets.size();
+    for (std::size_t k = 0; k < targets; ++k)
+      normals += values<float>(model, output)[static_cast<std::size_t>(frame) * targets + k] *
+                 normals_at(primitive.targets[k].at("NORMAL"));
+  }
+  const Eigen::Matrix3Xd shown = turn.toRotationMatrix() * normals.colwise().normalized();
+  const Eigen::Matrix3Xd real = surface_normals(creature.motion.at(frame), creature.triangles);
+  return std::sqrt((shown - real).squaredNorm() / static_cast<double>(real.cols()));
+}
+
+TEST(WriteSkinnedGlb, NormalsBendWithTheBody) {
+  const Creature creature = bar({0, 0.5, 1, 1.5, 2, 1, -0.5, -1.5});
+  write(scratch("bent"), creature);
+  const tinygltf::Model model = load(scratch("bent"));
+  EXPECT_LE(model.meshes[0].primitives[0].targets.size(), 8u);
+  for (const auto& target : model.meshes[0].primitives[0].targets)
+    EXPECT_TRUE(target.contains("POSITION")) << "as three.js wants";
+  for (Eigen::Index f = 0; f < creature.motion.count(); ++f) {
+    EXPECT_LT(normal_error(model, creature, f, true), 0.07) << "frame " << f;  // [rad]
+    EXPECT_LT((play(model, static_cast<std::size_t>(f)) - creature.motion.at(f)).cwiseAbs().maxCoeff(), 2e-6);
+  }
+  EXPECT_TRUE(read_gltf(scratch("bent")).warnings.empty()) << "targets of normals move no skin";
+  EXPECT_GT(normal_error(model, creature, 4, false), 0.3) << "the turn of the whole would do: the test tests nothing";
+}
+
+TEST(WriteSkinnedGlb, NormalsOfARigidBodyNeedNoHelp) {
+  write(scratch("rigid"), bar({0, 0, 0}));
+  EXPECT_TRUE(load(scratch("rigid")).meshes[0].primitives[0].targets.empty());
+}
+
 TEST(WriteSkinnedGlb, ALoopEndsWhereItsNextPeriodBegins) {
   Creature creature = random_creature(1, 12, 20, 6);
   creature.motion.loop = true;
@@ -211,8 +310,9 @@ TEST(WriteSkinnedGlb, KhronosValidatorFindsNothing) {
   Creature creature = random_creature(2, 20, 60, 8);
   creature.motion.loop = true;
   write(scratch("valid"), creature);
+  write(scratch("valid_bent"), bar({0, 1, 2}));
   const std::string command = "NODE_PATH='" HYDROSTAT_NODE_MODULES "' node '" HYDROSTAT_TESTS "/io/validate_glb.cjs' '" +
-                              scratch("valid").string() + "'";
+                              scratch("valid").string() + "' '" + scratch("valid_bent").string() + "'";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 

@@ -64,7 +64,8 @@ const std::set<std::string> kReplayKeys{
     "guard_steps",      "correction_rms",   "real_time_factor"};
 
 void expect_contract(const fs::path& creature, bool stays_up) {
-  std::set<std::string> files{"creature.toml", "body.json", "target.bin", "signals.json", "reference.glb", "report.json", "report.html", "cache"};
+  std::set<std::string> files{"creature.toml", "appearance.bin", "body.json",   "target.bin", "signals.json",
+                              "reference.glb", "report.json",    "report.html", "cache"};
   files.insert(stays_up ? "replay.glb" : "failed.glb");
   EXPECT_EQ(names_in(creature), files);
   const json report = report_of(creature);

@@ -18,7 +18,7 @@ const std::map<std::string, double> kGrades{{"draft", 0.05}, {"standard", 0.01},
 constexpr double kOverFloor = 3;                        // of the reference's own error [-]: what a grade asks for at least
 constexpr double kFinestSeconds = kControlSeconds / 8;  // of the closed loop that choices are held against
 
-/// Share of the work of the most accurate row that a choice saves; -1: nothing was chosen.
+/// Share of the work of the most accurate row that a choice saves; 0 where nothing was chosen.
 double work_saved(const std::vector<retarget::AccuracyRow>& rows, int choice) {
   const int finest = retarget::most_accurate(rows);
   if (choice < 0 || finest < 0) return 0;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "io/svg_text.h"
 
 namespace hydrostat::io {
 
@@ -14,28 +15,7 @@ namespace {
 // Layout of the diagram [px].
 constexpr double kWidth = 760, kHeight = 470, kLeft = 70, kRight = 150, kTop = 62, kBottom = 50;
 
-std::string number(double value, int digits = 3) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char letter : text) {
-    if (letter == '<')
-      result += "&lt;";
-    else if (letter == '&')
-      result += "&amp;";
-    else if (letter == '"')
-      result += "&quot;";
-    else
-      result += letter;
-  }
-  return result;
-}
-
-std::string percent(double share) { return number(100 * share) + " %"; }
+std::string percent(double share) { return short_number(100 * share) + " %"; }
 
 const char* colour_of(const std::string& method) {
   if (method == "explicit") return "#1f6fb4";
@@ -47,7 +27,7 @@ const char* colour_of(const std::string& method) {
 
 std::string name_of(const AccuracyRow& row) {
   std::string name =
-      row.method + ", " + std::to_string(row.nodes) + " nodes, " + row.element + ", step " + number(1000 * row.dt_s) + " ms";
+      row.method + ", " + std::to_string(row.nodes) + " nodes, " + row.element + ", step " + short_number(1000 * row.dt_s) + " ms";
   if (row.harmonics > 0) name += ", " + std::to_string(row.harmonics) + " harmonics";
   return name;
 }
@@ -75,20 +55,20 @@ struct Axis {
 std::string grid(const Axis& x, const Axis& y) {
   std::string svg;
   for (double d = x.low; d <= x.high + 0.5; ++d) {
-    const std::string at = number(x.at(std::pow(10, d)), 5);
-    svg += "<line x1=\"" + at + "\" x2=\"" + at + "\" y1=\"" + number(kTop) + "\" y2=\"" + number(kHeight - kBottom) +
-           "\" stroke=\"#ddd\"/><text x=\"" + at + "\" y=\"" + number(kHeight - kBottom + 16) +
-           "\" text-anchor=\"middle\">" + number(std::pow(10, d), 7) + "</text>\n";
+    const std::string at = short_number(x.at(std::pow(10, d)), 5);
+    svg += "<line x1=\"" + at + "\" x2=\"" + at + "\" y1=\"" + short_number(kTop) + "\" y2=\"" + short_number(kHeight - kBottom) +
+           "\" stroke=\"#ddd\"/><text x=\"" + at + "\" y=\"" + short_number(kHeight - kBottom + 16) +
+           "\" text-anchor=\"middle\">" + short_number(std::pow(10, d), 7) + "</text>\n";
   }
   for (double d = y.low; d <= y.high + 0.5; ++d) {
-    const std::string at = number(y.at(std::pow(10, d)), 5);
-    svg += "<line x1=\"" + number(kLeft) + "\" x2=\"" + number(kWidth - kRight) + "\" y1=\"" + at + "\" y2=\"" + at +
-           "\" stroke=\"#ddd\"/><text x=\"" + number(kLeft - 6) + "\" y=\"" + number(y.at(std::pow(10, d)) + 4, 5) +
-           "\" text-anchor=\"end\">" + number(100 * std::pow(10, d), 7) + " %</text>\n";
+    const std::string at = short_number(y.at(std::pow(10, d)), 5);
+    svg += "<line x1=\"" + short_number(kLeft) + "\" x2=\"" + short_number(kWidth - kRight) + "\" y1=\"" + at + "\" y2=\"" + at +
+           "\" stroke=\"#ddd\"/><text x=\"" + short_number(kLeft - 6) + "\" y=\"" + short_number(y.at(std::pow(10, d)) + 4, 5) +
+           "\" text-anchor=\"end\">" + short_number(100 * std::pow(10, d), 7) + " %</text>\n";
   }
-  svg += "<text x=\"" + number((kLeft + kWidth - kRight) / 2) + "\" y=\"" + number(kHeight - 12) +
+  svg += "<text x=\"" + short_number((kLeft + kWidth - kRight) / 2) + "\" y=\"" + short_number(kHeight - 12) +
          "\" text-anchor=\"middle\">processor time [ms for a simulated second]</text>\n";
-  svg += "<text transform=\"translate(16 " + number((kTop + kHeight - kBottom) / 2) +
+  svg += "<text transform=\"translate(16 " + short_number((kTop + kHeight - kBottom) / 2) +
          ") rotate(-90)\" text-anchor=\"middle\">error [% of L, RMS over the skin]</text>\n";
   return svg;
 }
@@ -109,11 +89,11 @@ std::string table(const AccuracyCurve& curve, const std::vector<bool>& front) {
     const AccuracyRow& row = curve.rows[k];
     html += "<tr id=\"row" + std::to_string(k) + "\"" +
             (static_cast<int>(k) == curve.recommended ? " class=\"chosen\"" : "") + "><td>" + row.method + "<td>" +
-            row.element + "<td>" + std::to_string(row.nodes) + "<td>" + number(1000 * row.dt_s) + "<td>" +
-            number(row.iterations) + "<td>" + (row.harmonics > 0 ? std::to_string(row.harmonics) : "-");
+            row.element + "<td>" + std::to_string(row.nodes) + "<td>" + short_number(1000 * row.dt_s) + "<td>" +
+            short_number(row.iterations) + "<td>" + (row.harmonics > 0 ? std::to_string(row.harmonics) : "-");
     for (const double value : {row.error_rms_m, 100 * row.error_rel_length, row.ms_per_sim_s, row.work_ms,
                                100 * row.volume_error, row.momentum_error, row.angular_error}) {
-      html += "<td>" + (std::isfinite(value) ? number(value) : std::string("-"));
+      html += "<td>" + (std::isfinite(value) ? short_number(value) : std::string("-"));
     }
     html += std::string("<td>") + (row.stable ? "yes" : "no") + "<td>" + (front[k] ? "yes" : "") + "</tr>\n";
   }
@@ -127,11 +107,11 @@ std::string accuracy_csv(const AccuracyCurve& curve) {
       "method,element,nodes,dt_s,iterations,harmonics,error_rms_m,error_rel_length,ms_per_sim_s,volume_error,momentum_error,"
       "angular_error,stable\n";
   for (const AccuracyRow& row : curve.rows) {
-    csv += row.method + "," + row.element + "," + std::to_string(row.nodes) + "," + number(row.dt_s, 9) + "," +
-           number(row.iterations, 6) + "," + std::to_string(row.harmonics);
+    csv += row.method + "," + row.element + "," + std::to_string(row.nodes) + "," + short_number(row.dt_s, 9) + "," +
+           short_number(row.iterations, 6) + "," + std::to_string(row.harmonics);
     for (const double value : {row.error_rms_m, row.error_rel_length, row.ms_per_sim_s, row.volume_error, row.momentum_error,
                                row.angular_error}) {
-      csv += "," + number(value, 6);
+      csv += "," + short_number(value, 6);
     }
     csv += row.stable ? ",1\n" : ",0\n";
   }
@@ -151,17 +131,17 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
   x.finish();
   y.finish();
   std::string svg =
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + number(kWidth) + " " + number(kHeight) +
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + short_number(kWidth) + " " + short_number(kHeight) +
       "\" role=\"img\" font-family=\"sans-serif\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" "
       "fill=\"#fff\"/>\n<text x=\"" +
-      number(kLeft) + "\" y=\"20\" font-size=\"14\" font-weight=\"bold\">What accuracy costs: " + escaped(curve.subject) +
-      "</text>\n<text x=\"" + number(kLeft) + "\" y=\"38\">" + escaped(sentence(curve)) + "</text>\n<text x=\"" +
-      number(kLeft) + "\" y=\"53\">Down and to the left is better; the line joins what nothing beats in both.</text>\n";
+      short_number(kLeft) + "\" y=\"20\" font-size=\"14\" font-weight=\"bold\">What accuracy costs: " + escaped(curve.subject) +
+      "</text>\n<text x=\"" + short_number(kLeft) + "\" y=\"38\">" + escaped(sentence(curve)) + "</text>\n<text x=\"" +
+      short_number(kLeft) + "\" y=\"53\">Down and to the left is better; the line joins what nothing beats in both.</text>\n";
   svg += grid(x, y);
   if (curve.floor > 0) {
-    svg += "<line x1=\"" + number(kLeft) + "\" x2=\"" + number(kWidth - kRight) + "\" y1=\"" + number(y.at(curve.floor), 5) +
-           "\" y2=\"" + number(y.at(curve.floor), 5) + "\" stroke=\"#c33\" stroke-dasharray=\"4 3\"/><text x=\"" +
-           number(kWidth - kRight + 4) + "\" y=\"" + number(y.at(curve.floor) + 4, 5) +
+    svg += "<line x1=\"" + short_number(kLeft) + "\" x2=\"" + short_number(kWidth - kRight) + "\" y1=\"" + short_number(y.at(curve.floor), 5) +
+           "\" y2=\"" + short_number(y.at(curve.floor), 5) + "\" stroke=\"#c33\" stroke-dasharray=\"4 3\"/><text x=\"" +
+           short_number(kWidth - kRight + 4) + "\" y=\"" + short_number(y.at(curve.floor) + 4, 5) +
            "\" fill=\"#c33\">the reference's own</text>\n";
   }
   const std::vector<bool> front = retarget::pareto_front(curve.rows);
@@ -173,7 +153,7 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
             [&](std::size_t a, std::size_t b) { return curve.rows[a].ms_per_sim_s < curve.rows[b].ms_per_sim_s; });
   std::string line;
   for (const std::size_t k : order) {
-    line += number(x.at(curve.rows[k].ms_per_sim_s), 5) + "," + number(y.at(curve.rows[k].error_rel_length), 5) + " ";
+    line += short_number(x.at(curve.rows[k].ms_per_sim_s), 5) + "," + short_number(y.at(curve.rows[k].error_rel_length), 5) + " ";
   }
   svg += "<polyline fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.5\" points=\"" + line + "\"/>\n";
   std::vector<std::string> methods;
@@ -182,9 +162,9 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
     if (!row.stable) continue;
     if (std::find(methods.begin(), methods.end(), row.method) == methods.end()) methods.push_back(row.method);
     const std::string at =
-        "cx=\"" + number(x.at(row.ms_per_sim_s), 5) + "\" cy=\"" + number(y.at(row.error_rel_length), 5) + "\"";
+        "cx=\"" + short_number(x.at(row.ms_per_sim_s), 5) + "\" cy=\"" + short_number(y.at(row.error_rel_length), 5) + "\"";
     svg += (has_links ? "<a href=\"#row" + std::to_string(k) + "\">" : std::string("<g>")) + "<title>" +
-           escaped(name_of(row)) + ": " + percent(row.error_rel_length) + " of L, " + number(row.ms_per_sim_s) +
+           escaped(name_of(row)) + ": " + percent(row.error_rel_length) + " of L, " + short_number(row.ms_per_sim_s) +
            " ms a second</title>";
     if (static_cast<int>(k) == curve.recommended)
       svg += "<circle " + at + " r=\"10\" fill=\"none\" stroke=\"#000\" stroke-width=\"2\"/>";
@@ -194,13 +174,13 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
            (front[k] ? "1" : "0.5") + "\"/>" + (has_links ? "</a>\n" : "</g>\n");
   }
   for (std::size_t m = 0; m < methods.size(); ++m) {
-    svg += "<text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" + number(kTop + 14 + 16 * static_cast<double>(m)) +
+    svg += "<text x=\"" + short_number(kWidth - kRight + 14) + "\" y=\"" + short_number(kTop + 14 + 16 * static_cast<double>(m)) +
            "\" fill=\"" + colour_of(methods[m]) + "\">&#9679; " + methods[m] + "</text>\n";
   }
   const double below = kTop + 30 + 16 * static_cast<double>(methods.size());
-  svg += "<text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" + number(below) +
-         "\" fill=\"#666\">&#9679; tets, triangles</text><text x=\"" + number(kWidth - kRight + 14) + "\" y=\"" +
-         number(below + 16) + "\" fill=\"#666\">&#9675; hexahedra, quads</text>\n";
+  svg += "<text x=\"" + short_number(kWidth - kRight + 14) + "\" y=\"" + short_number(below) +
+         "\" fill=\"#666\">&#9679; tets, triangles</text><text x=\"" + short_number(kWidth - kRight + 14) + "\" y=\"" +
+         short_number(below + 16) + "\" fill=\"#666\">&#9675; hexahedra, quads</text>\n";
   return svg + "</svg>\n";
 }
 

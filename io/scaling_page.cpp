@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
+
+#include "io/svg_text.h"
 
 namespace hydrostat::io {
 
@@ -14,25 +15,6 @@ namespace {
 
 // Layout of a diagram [px].
 constexpr double kWidth = 560, kHeight = 300, kLeft = 60, kRight = 20, kTop = 34, kBottom = 44;
-
-std::string number(double value, int digits = 3) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char letter : text) {
-    if (letter == '<')
-      result += "&lt;";
-    else if (letter == '&')
-      result += "&amp;";
-    else
-      result += letter;
-  }
-  return result;
-}
 
 struct Curve {
   std::string name, colour;
@@ -53,25 +35,25 @@ std::string diagram(const std::vector<ScalingRow>& rows, const std::string& titl
     return kLeft + (std::log10(elements) - low) / (high - low) * (kWidth - kLeft - kRight);
   };
   const auto y = [&](double value) { return kHeight - kBottom - value / (1.1 * top) * (kHeight - kTop - kBottom); };
-  std::string svg = "<svg viewBox=\"0 0 " + number(kWidth) + " " + number(kHeight) + "\" role=\"img\"><text x=\"" +
-                    number(kLeft) + "\" y=\"18\" class=\"title\">" + escaped(title) + "</text>\n";
+  std::string svg = "<svg viewBox=\"0 0 " + short_number(kWidth) + " " + short_number(kHeight) + "\" role=\"img\"><text x=\"" +
+                    short_number(kLeft) + "\" y=\"18\" class=\"title\">" + escaped(title) + "</text>\n";
   for (int k = 0; k <= 4; ++k) {
     const double value = 1.1 * top * k / 4;
-    svg += "<line x1=\"" + number(kLeft) + "\" x2=\"" + number(kWidth - kRight) + "\" y1=\"" + number(y(value), 5) +
-           "\" y2=\"" + number(y(value), 5) + "\" class=\"grid\"/><text x=\"" + number(kLeft - 6) + "\" y=\"" +
-           number(y(value) + 4, 5) + "\" text-anchor=\"end\">" + number(value) + "</text>\n";
+    svg += "<line x1=\"" + short_number(kLeft) + "\" x2=\"" + short_number(kWidth - kRight) + "\" y1=\"" + short_number(y(value), 5) +
+           "\" y2=\"" + short_number(y(value), 5) + "\" class=\"grid\"/><text x=\"" + short_number(kLeft - 6) + "\" y=\"" +
+           short_number(y(value) + 4, 5) + "\" text-anchor=\"end\">" + short_number(value) + "</text>\n";
   }
   for (const ScalingRow& row : rows) {
-    svg += "<text x=\"" + number(x(row.elements), 5) + "\" y=\"" + number(kHeight - kBottom + 16, 5) +
+    svg += "<text x=\"" + short_number(x(row.elements), 5) + "\" y=\"" + short_number(kHeight - kBottom + 16, 5) +
            "\" text-anchor=\"middle\">" +
-           (row.elements >= 10000 ? number(row.elements / 1000.0) + "k" : std::to_string(row.elements)) + "</text>\n";
+           (row.elements >= 10000 ? short_number(row.elements / 1000.0) + "k" : std::to_string(row.elements)) + "</text>\n";
   }
-  svg += "<text x=\"" + number(kWidth / 2) + "\" y=\"" + number(kHeight - 8) + "\" text-anchor=\"middle\">elements</text>\n";
+  svg += "<text x=\"" + short_number(kWidth / 2) + "\" y=\"" + short_number(kHeight - 8) + "\" text-anchor=\"middle\">elements</text>\n";
   for (std::size_t c = 0; c < curves.size(); ++c) {
     std::string points;
-    for (const ScalingRow& row : rows) points += number(x(row.elements), 5) + "," + number(y(curves[c].value(row)), 5) + " ";
+    for (const ScalingRow& row : rows) points += short_number(x(row.elements), 5) + "," + short_number(y(curves[c].value(row)), 5) + " ";
     svg += "<polyline fill=\"none\" stroke-width=\"2\" stroke=\"" + curves[c].colour + "\" points=\"" + points +
-           "\"/><text x=\"" + number(kWidth - kRight) + "\" y=\"" + number(kTop + 14 * static_cast<double>(c)) +
+           "\"/><text x=\"" + short_number(kWidth - kRight) + "\" y=\"" + short_number(kTop + 14 * static_cast<double>(c)) +
            "\" text-anchor=\"end\" fill=\"" + curves[c].colour + "\">" + escaped(curves[c].name) + "</text>\n";
   }
   return svg + "</svg>\n";
@@ -84,10 +66,10 @@ std::string table(const ScalingReport& report) {
       " threads, clock<th>bytes an element<th>memory's limit [ns]<th>arithmetic's limit [ns]</tr>\n";
   for (const ScalingRow& row : report.rows) {
     html += "<tr><td>" + std::to_string(row.elements) + "<td>" + std::to_string(row.nodes) + "<td>" +
-            number(row.substeps_per_s, 4);
+            short_number(row.substeps_per_s, 4);
     for (const double value : {row.cpu_ns, row.one_ns, row.shared_ns, row.bytes, memory_limit_ns(report, row),
                                arithmetic_limit_ns(report, row)}) {
-      html += "<td>" + (value > 0 ? number(value) : std::string("-"));
+      html += "<td>" + (value > 0 ? short_number(value) : std::string("-"));
     }
     html += "</tr>\n";
   }
@@ -109,11 +91,11 @@ std::string scaling_csv(const ScalingReport& report) {
       "ns,arithmetic_limit_ns,whole\n";
   for (const ScalingRow& row : report.rows) {
     csv += std::to_string(row.elements) + "," + std::to_string(row.nodes);
-    for (const double value : {row.substeps_per_s, row.cpu_ns, row.one_ns, row.shared_ns}) csv += "," + number(value, 6);
+    for (const double value : {row.substeps_per_s, row.cpu_ns, row.one_ns, row.shared_ns}) csv += "," + short_number(value, 6);
     csv += "," + std::to_string(report.threads);
     for (const double value :
          {row.bytes, row.work.flops, row.work.bytes, memory_limit_ns(report, row), arithmetic_limit_ns(report, row)}) {
-      csv += "," + number(value, 6);
+      csv += "," + short_number(value, 6);
     }
     csv += row.is_whole ? ",1\n" : ",0\n";
   }
@@ -159,10 +141,10 @@ std::string scaling_page(const ScalingReport& report) {
   html += "<h1>Scaling of '" + escaped(report.method) + "', " + escaped(report.scene) + "</h1>\n<p>";
   if (report.rows.size() > 1) {
     html += "Processor time of a substep grows with the number of elements to the power " +
-            number(retarget::growth_exponent(report.rows)) + ". ";
+            short_number(retarget::growth_exponent(report.rows)) + ". ";
   }
-  html += "This machine, one thread: " + number(1e-9 * report.machine.bytes_per_s) + " GB/s, " +
-          number(1e-9 * report.machine.flops) +
+  html += "This machine, one thread: " + short_number(1e-9 * report.machine.bytes_per_s) + " GB/s, " +
+          short_number(1e-9 * report.machine.flops) +
           " Gflop/s. Limits are what the data of an element, each read or written once, and its operations would take at "
           "these rates; a body "
           "that fits the caches can be faster than the memory's.</p>\n";

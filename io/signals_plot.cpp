@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "io/svg_text.h"
+
 namespace hydrostat::io {
 
 namespace {
@@ -23,29 +25,6 @@ std::string number(double value, int decimals) {
   char text[32];
   std::snprintf(text, sizeof text, "%.*f", decimals, value);
   return text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char letter : text) {
-    switch (letter) {
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '&':
-        result += "&amp;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += letter;
-    }
-  }
-  return result;
 }
 
 /// Where time and activation fall on the page.

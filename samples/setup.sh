@@ -14,7 +14,7 @@ command -v node >/dev/null || packages+=(nodejs)
 command -v npm >/dev/null || packages+=(npm)
 if [ "${1:-}" = --tests ]; then
   command -v chromium >/dev/null || packages+=(chromium)
-  packages+=(calculix-ccx)
+  packages+=(calculix-ccx valgrind)
 fi
 [ "${1:-}" != --bench ] || packages+=(libbenchmark-dev libbullet-dev)
 

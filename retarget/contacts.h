@@ -42,7 +42,8 @@ struct ContactOptions {
   int least_frames = 4;        // shorter contacts and gaps are closed
 };
 
-/// Labels for the points' motion (height above the ground y = 0). `bone_of_point` names each point's patch.
+/// Labels for the points' motion (height above the ground y = 0). Frames without contact in which the points' mean height does
+/// not fall freely are no flight: the lowest and slowest patch bears there, see support_height. `bone_of_point` names each point's patch.
 /// length [m] is L, size [m] is D.
 ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bone_of_point,
                                const std::vector<std::string>& bone_names, double length, double size,

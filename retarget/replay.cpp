@@ -60,6 +60,7 @@ class Run {
   const MotionCurve curve_;
   const std::unique_ptr<physics::Stepper> stepper_;
   Corrector corrector_;
+  Observer observer_;
   ReferenceGlide glide_;
   StrideFeedback stride_;
 
@@ -91,8 +92,9 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       curve_(target_),
       stepper_(physics::make_stepper(options.method, input.scene)),
       corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
+      observer_(options.observation, control_s_),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
-      stride_(input.prepared, input.length, input.scene.body.edge_count(), input.feed_forward),
+      stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       state_(first_state(target_, curve_)),
       activation_(input.scene.body.edge_count()),
       mean_activation_(activation_.size()),
@@ -104,6 +106,8 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       thresholds_(contact_thresholds(input.scene, input.length, control_s_)),
       metrics_(input, control_s_, steps_, state_),
       frames_{column(state_.x)} {
+  curve_.at(0, reference_.x, reference_.v);
+  fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);
   input.feed_forward(0, mean_activation_);
@@ -133,21 +137,22 @@ void Run::look_at_contacts() {
   }
 }
 
-/// The correction for the coming control step.
+/// The correction for the coming control step, by what is seen of the body.
 void Run::control() {
-  curve_.at(time_s_, reference_.x, reference_.v);
-  fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   correction_ = 0;
   if (!options_.correct) return;
+  const physics::State& seen = options_.observation.is_exact() ? state_ : observer_.see(state_);
+  curve_.at(std::max(0.0, time_s_ - static_cast<double>(observer_.delay_steps()) * control_s_), reference_.x, reference_.v);
+  fit_ = best_rigid_fit(reference_.x, seen.x, mass_shares_);
   glided_ = reference_;
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
-  stride_.follow(fit_.mean_a, fit_.mean_b, control_s_);
+  stride_.follow(fit_, control_s_);
   look_at_contacts();
   input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
-  stride_.apply(activation_);
+  stride_.apply(time_s_ + 0.5 * control_s_, activation_);
   feedback_ = -activation_;
-  correction_ = corrector_.correct(state_, glided_, contact_, activation_);
+  correction_ = corrector_.correct(seen, glided_, contact_, activation_);
   feedback_ += activation_;
 }
 
@@ -155,7 +160,7 @@ void Run::control() {
 /// by friction. Feedback comes at once, for what comes later balances worse.
 void Run::activate(double share_of_step) {
   input_.feed_forward(time_s_ + share_of_step * control_s_, activation_);
-  stride_.apply(activation_);
+  stride_.apply(time_s_ + share_of_step * control_s_, activation_);
   activation_ += feedback_;
   activation_ = activation_.cwiseMax(1 - input_.limit).cwiseMin(1 + input_.limit);
 }

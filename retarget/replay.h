@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "retarget/corrector.h"
+#include "retarget/observer.h"
 #include "retarget/prepare.h"
 #include "retarget/push.h"
 #include "retarget/run_report.h"
@@ -18,6 +19,7 @@ struct ReplayOptions {
   physics::Method method = physics::Method::kExplicit;
   bool correct = true;
   CorrectorOptions corrector;
+  Observation observation;  // of the corrector
   std::vector<Push> pushes;
   bool trace = false;
 };

@@ -24,13 +24,16 @@ constexpr double kPushCycle = 2;        // in which the push comes; seconds wher
 constexpr int kEighths = 8, kQuarters = 4;
 
 /// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15".
-void set_variant(const std::string& variant, retarget::CorrectorOptions& options) {
+void set_variant(const std::string& variant, retarget::ReplayOptions& replay) {
+  retarget::CorrectorOptions& options = replay.corrector;
   const std::map<std::string, double*> knobs{{"effort", &options.effort},       {"settle", &options.settle_s},
                                              {"nodes", &options.node_weight},   {"root", &options.root_weight},
                                              {"horizon", &options.horizon_s}, {"cone", &options.cone_weight},
                                              {"foot", &options.foot_weight},  {"foot_settle", &options.foot_settle_s},
                                              {"step", &options.step},         {"ahead", &options.step_ahead},
-                                             {"calm", &options.calm},         {"calm_error", &options.calm_error}};
+                                             {"calm", &options.calm},         {"calm_error", &options.calm_error},
+                                             {"noise", &replay.observation.noise_m},
+                                             {"delay", &replay.observation.delay_s}};
   std::istringstream parts(variant);
   for (std::string part; std::getline(parts, part, ':');) {
     if (part == "usual") continue;
@@ -87,11 +90,12 @@ int run(int argc, char** argv) {
   const retarget::Performer& performer = creature.target.performer;
   const retarget::Motion& target = performer.prepared.target;
   retarget::PerformOptions options;
-  set_variant(variant, options.replay.corrector);
+  set_variant(variant, options.replay);
   options.replay.duration_s = target.loop ? std::atof(argv[5]) * target.duration_s() : retarget::usual_duration(target);
   options.baselines = false;
   options.threads = 1;
   options.seed = seed;
+  options.replay.observation.seed = seed;
   options.variation = kVariation;
   std::mt19937 random(seed);
   const double angle = 2 * M_PI * static_cast<double>(random()) / 4294967296.0;

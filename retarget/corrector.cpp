@@ -18,6 +18,14 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
       matrix_(scene.body),
       forces_(scene.body) {
   previous_ = Eigen::VectorXd::Zero(muscles.fields.cols());
+  for (const auto field : muscles.fields.colwise()) {
+    std::vector<int>& springs = springs_of_.emplace_back();
+    for (int e = 0; e < scene.body.edge_count(); ++e) {
+      if (field[e] != 0 && scene.body.edge_stiffness[e] != 0) springs.push_back(e);
+    }
+  }
+  const double unit = options.node_weight / speed_unit_;
+  node_shares_ = (unit * unit / scene.body.mass.sum()) * scene.body.mass.transpose().replicate<3, 1>().reshaped();
   // Stiff against the body's own springs, soft enough for the factor: a point gives half a thousandth of L under the weight.
   contact_stiffness_ = scene.body.mass.sum() * scene.gravity.norm() / (5e-4 * length);
   for (const physics::BodyElements<3>& elements : scene.body.elements) {
@@ -33,19 +41,25 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
   }
 }
 
+void Corrector::reset() {
+  previous_.setZero();
+  touching_of_response_.clear();
+}
+
 /// Adds th B phi for each muscle to its column of the response.
 void Corrector::add_response_of_springs(const physics::State& state) {
   const physics::Body& body = scene_.body;
+  pull_.resize(3, body.edge_count());
   for (int e = 0; e < body.edge_count(); ++e) {
-    if (body.edge_stiffness[e] == 0) continue;
-    const int i = body.edges(0, e), j = body.edges(1, e);
-    const Eigen::Vector3d push =
-        options_.horizon_s * body.edge_stiffness[e] * body.rest_length[e] * (state.x.col(j) - state.x.col(i)).normalized();
-    for (Eigen::Index k = 0; k < muscles_.fields.cols(); ++k) {
-      const double field = muscles_.fields(e, k);
-      if (field == 0) continue;
-      response_.col(k).segment<3>(3 * j) += field * push;
-      response_.col(k).segment<3>(3 * i) -= field * push;
+    pull_.col(e) = options_.horizon_s * body.edge_stiffness[e] * body.rest_length[e] *
+                   (state.x.col(body.edges(1, e)) - state.x.col(body.edges(0, e))).normalized();
+  }
+  for (std::size_t k = 0; k < springs_of_.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    for (const int e : springs_of_[k]) {
+      const Eigen::Vector3d push = muscles_.fields(e, column) * pull_.col(e);
+      response_.col(column).segment<3>(3 * body.edges(1, e)) += push;
+      response_.col(column).segment<3>(3 * body.edges(0, e)) -= push;
     }
   }
 }
@@ -84,31 +98,34 @@ bool Corrector::factor_system(const physics::State& state, const ContactNow& con
   return matrix_.factor();
 }
 
-/// Fills the response: A^-1 th B phi for each muscle, and the free deviation last.
-void Corrector::respond(const physics::State& state, const physics::State& reference) {
-  const physics::Body& body = scene_.body;
-  const Eigen::Index muscles = muscles_.fields.cols();
-  response_.setZero(3 * body.node_count(), muscles + 1);
+/// What the muscles do, A^-1 th B phi for each, and its products. On the path it hardly changes from one control step to the next and
+/// is kept for some, while the same points touch; a creature that fights a push needs it fresh. False where the system cannot be
+/// factored.
+bool Corrector::respond(const physics::State& state, const ContactNow& contact) {
+  const bool calm = momentum_error_ < options_.calm_error && contact.touching == touching_of_response_;
+  if (calm && ++response_age_ < options_.response_every) return true;
+  touching_of_response_.clear();
+  if (!factor_system(state, contact)) return false;
+  touching_of_response_ = contact.touching;
+  response_age_ = 0;
+  response_.setZero(3 * scene_.body.node_count(), muscles_.fields.cols());
   add_response_of_springs(state);
   add_response_of_elements(state);
+  matrix_.solve_in_place(response_);
+  scaled_ = node_shares_.cwiseSqrt().asDiagonal() * response_;
+  node_normal_.setZero(response_.cols(), response_.cols());
+  node_normal_.selfadjointView<Eigen::Lower>().rankUpdate(scaled_.transpose());
+  return true;
+}
+
+void Corrector::find_free_deviation(const physics::State& state, const physics::State& reference) {
+  const physics::Body& body = scene_.body;
   force_.setZero(3, body.node_count());
   reference_force_.setZero(3, body.node_count());
   forces_.add_elastic_forces(state.x, force_);
   forces_.add_elastic_forces(reference.x, reference_force_);
-  for (int i = 0; i < body.node_count(); ++i) {
-    response_.col(muscles).segment<3>(3 * i) = body.mass[i] * (state.v.col(i) - reference.v.col(i)) +
-                                               options_.horizon_s * (force_.col(i) - reference_force_.col(i));
-  }
-  matrix_.solve_in_place(response_);
-}
-
-/// Every node by its share of the mass.
-void Corrector::weigh_nodes() {
-  const Eigen::VectorXd& mass = scene_.body.mass;
-  for (Eigen::Index i = 0; i < mass.size(); ++i) {
-    weighted_.middleRows<3>(3 * i) =
-        (options_.node_weight * std::sqrt(mass[i] / mass.sum()) / speed_unit_) * response_.middleRows<3>(3 * i);
-  }
+  deviation_ = ((state.v - reference.v) * body.mass.asDiagonal() + options_.horizon_s * (force_ - reference_force_)).reshaped();
+  matrix_.solve_in_place(deviation_);
 }
 
 /// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration. Returns how far all six are off,
@@ -130,8 +147,10 @@ double Corrector::weigh_momentum(const physics::State& state, double grip) {
     rows.block<3, 3>(3, 3 * i) = gyration * body.mass[i] * inverse_inertia * cross;
   }
   for (const int row : {0, 2, 4}) rows.row(row) *= grip;
-  weighted_.middleRows<6>(3 * nodes).noalias() = (options_.root_weight / speed_unit_) * rows * response_;
-  return weighted_.middleRows<6>(3 * nodes).rightCols<1>().norm() / options_.root_weight;
+  rows *= options_.root_weight / speed_unit_;
+  weighted_.topLeftCorner(6, response_.cols()).noalias() = rows * response_;
+  weighted_.topRightCorner<6, 1>().noalias() = rows * deviation_;
+  return weighted_.topRightCorner<6, 1>().norm() / options_.root_weight;
 }
 
 /// The mean of each foot in the air, on its way to where it can catch the body.
@@ -144,8 +163,8 @@ void Corrector::weigh_feet(const physics::State& state, const physics::State& re
   const Eigen::Vector3d ahead =
       physics::centre_of_mass(body, state.x) - com + ahead_s * (state.v - reference.v) * body.mass / body.mass.sum();
   const Eigen::Vector3d step = options_.step * (ahead - up.dot(ahead) * up);
-  const Eigen::Index last = response_.cols() - 1;
-  Eigen::Index row = 3 * body.node_count() + 6;
+  const Eigen::Index last = response_.cols();
+  Eigen::Index row = 6;
   for (const Patch* foot : in_air) {
     auto mean = weighted_.middleRows<3>(row);
     mean.setZero();
@@ -154,7 +173,9 @@ void Corrector::weigh_feet(const physics::State& state, const physics::State& re
     for (const int p : foot->points) {
       for (int c = 0; c < scene_.contact_points.nodes.rows(); ++c) {
         const int node = scene_.contact_points.nodes(c, p);
-        mean += share * scene_.contact_points.weights(c, p) * response_.middleRows<3>(3 * node);
+        const double weight = share * scene_.contact_points.weights(c, p);
+        mean.leftCols(last) += weight * response_.middleRows<3>(3 * node);
+        mean.col(last) += weight * deviation_.segment<3>(3 * node);
       }
       error += share * (scene_.contact_points.of(state.x, p) - scene_.contact_points.of(reference.x, p));
     }
@@ -172,28 +193,27 @@ double Corrector::least_margin() const {
 double Corrector::correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
                           Eigen::VectorXd& activation) {
   const physics::Body& body = scene_.body;
-  const int nodes = body.node_count();
   const Eigen::Index muscles = muscles_.fields.cols();
   forces_.set_activation(activation);
-  if (!factor_system(state, contact)) return 0;
-  respond(state, reference);
+  if (!respond(state, contact)) return 0;
+  find_free_deviation(state, reference);
 
   // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.
-  weighted_.resize(3 * nodes + 6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
+  weighted_.resize(6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
   weigh_feet(state, reference, contact.in_air);
   const double weight = body.mass.sum() * scene_.gravity.norm();
   cone_rows(scene_, contact.touching, contact.bearing, contact.force / weight,
-            (contact_stiffness_ * options_.horizon_s / weight) * response_.leftCols(muscles), previous_, cones_);
-  response_.col(muscles) += (state.x - reference.x).reshaped() / options_.settle_s;
-  weigh_nodes();
-  const double error = weigh_momentum(state, contact.grip);
+            (contact_stiffness_ * options_.horizon_s / weight) * response_, previous_, cones_);
+  deviation_ += (state.x - reference.x).reshaped() / options_.settle_s;
+  momentum_error_ = weigh_momentum(state, contact.grip);
 
   normal_.setZero(muscles + 1, muscles + 1);
   normal_.selfadjointView<Eigen::Lower>().rankUpdate(weighted_.transpose());
-  Eigen::MatrixXd left = normal_.topLeftCorner(muscles, muscles);
-  const double calm = options_.calm / (1 + std::pow(error / options_.calm_error, 2));
+  Eigen::MatrixXd left = node_normal_ + normal_.topLeftCorner(muscles, muscles);
+  const Eigen::VectorXd pulled = response_.transpose() * node_shares_.cwiseProduct(deviation_);
+  const double calm = options_.calm / (1 + std::pow(momentum_error_ / options_.calm_error, 2));
   left.diagonal().array() += options_.effort * (1 + calm) + options_.change;
-  const Eigen::VectorXd right = options_.change * previous_ - normal_.row(muscles).head(muscles).transpose();
+  const Eigen::VectorXd right = options_.change * previous_ - normal_.row(muscles).head(muscles).transpose() - pulled;
   previous_ = solve_within_cones(left, right, cones_, options_.cone_weight);
   activation += muscles_.fields * previous_;
   activation = activation.cwiseMax(1 - limit_).cwiseMin(1 + limit_);

@@ -21,6 +21,7 @@ struct CorrectorOptions {
   double foot_settle_s = 0.1;   // tau of a foot in the air
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
   double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
+  int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
 };
 
 /// What contact does when muscles are corrected, and what it is to do.
@@ -53,7 +54,7 @@ class Corrector {
   /// muscles' correction.
   double correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
                  Eigen::VectorXd& activation);
-  void reset() { previous_.setZero(); }
+  void reset();
   const Eigen::VectorXd& muscles_now() const { return previous_; }
   /// How far inside their cones the forces at bearing points stay over the horizon, by the last correction's own model [m
   /// g]; negative outside, 0 where nothing bears.
@@ -68,8 +69,8 @@ class Corrector {
   void add_response_of_springs(const physics::State& state);
   void add_response_of_elements(const physics::State& state);
   bool factor_system(const physics::State& state, const ContactNow& contact);
-  void respond(const physics::State& state, const physics::State& reference);
-  void weigh_nodes();
+  bool respond(const physics::State& state, const ContactNow& contact);
+  void find_free_deviation(const physics::State& state, const physics::State& reference);
   double weigh_momentum(const physics::State& state, double grip);
   void weigh_feet(const physics::State& state, const physics::State& reference, const std::vector<const Patch*>& in_air);
 
@@ -79,10 +80,18 @@ class Corrector {
   double speed_unit_, limit_, contact_stiffness_;
   physics::SystemMatrix matrix_;
   physics::InternalForces<3> forces_;
+  std::vector<std::vector<int>> springs_of_;                // of each muscle: the springs that it shortens
+  Eigen::VectorXd node_shares_;                             // 3N: the squared weight of each row of nodes
   std::vector<std::vector<ElementFields>> element_fields_;  // of the elements of each block
-  Eigen::MatrixXd response_;  // 3N x (muscles + 1): change of velocity by each muscle, and what comes without any
-  Eigen::MatrixXd weighted_, normal_, cones_;
-  Eigen::VectorXd free_, previous_;
+  Eigen::MatrixXd response_;       // 3N x muscles: change of velocity by each
+  Eigen::MatrixXd node_normal_;    // muscles x muscles: the response's own products, nodes weighted
+  std::vector<ContactState> touching_of_response_;
+  int response_age_ = 0;
+  double momentum_error_ = 0;      // at the last call, in speeds per sqrt(g L)
+  Eigen::VectorXd deviation_;      // 3N: the change of velocity that comes without any muscle, later with the error of place
+  Eigen::MatrixXd weighted_, normal_, scaled_, cones_;  // weighted_: the few rows beside the nodes', x (muscles + 1)
+  Eigen::Matrix3Xd pull_;          // 3 x E [N s]: of a spring's unit activation over the horizon
+  Eigen::VectorXd previous_;
   Eigen::Matrix3Xd force_, reference_force_;
 };
 

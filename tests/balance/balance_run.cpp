@@ -38,6 +38,10 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay) {
   for (std::string part; std::getline(parts, part, ':');) {
     if (part == "usual") continue;
     const std::size_t equals = part.find('=');
+    if (part.substr(0, equals) == "every" && equals != std::string::npos) {
+      options.response_every = std::stoi(part.substr(equals + 1));
+      continue;
+    }
     const auto knob = knobs.find(part.substr(0, equals));
     if (equals == std::string::npos || knob == knobs.end()) {
       throw Error("balance_run", "VARIANT", "'" + part + "' changes nothing that is known", "Write it like effort=1:settle=0.15.");

@@ -124,6 +124,9 @@ void fill(Group& group, const retarget::ReplayReport& replay) {
   group.add("inverted_elements", replay.inverted_elements);
   group.add("guard_steps", replay.guard_steps);
   group.add("correction_rms", replay.correction_rms);
+  group.add("correction_buzz_rms", replay.correction_buzz_rms);
+  group.add("style_range", replay.style_range);
+  group.add("style_range_least", replay.style_range_least);
   group.add("real_time_factor", replay.real_time_factor);
   group.add("apex_rise_length", replay.apex_rise_length);
   group.add("clip_apex_rise_length", replay.clip_apex_rise_length);

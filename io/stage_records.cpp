@@ -190,7 +190,8 @@ void name_fields(RecordArchive& archive, retarget::ReplayReport& report) {
                  report.sole_gap_length, "penetration", report.penetration_max_size, "volume_error", report.volume_error_max,
                  "momentum_residual", report.momentum_residual_mg, "angular_residual", report.angular_residual_mgl,
                  "external_assist", report.external_assist_mg, "inverted_elements", report.inverted_elements, "guard_steps",
-                 report.guard_steps, "correction", report.correction_rms, "real_time_factor", report.real_time_factor,
+                 report.guard_steps, "correction", report.correction_rms, "correction_buzz", report.correction_buzz_rms, "style_range",
+                 report.style_range, "style_range_least", report.style_range_least, "real_time_factor", report.real_time_factor,
                  "apex_rise", report.apex_rise_length, "clip_apex_rise", report.clip_apex_rise_length);
 }
 

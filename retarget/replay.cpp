@@ -64,7 +64,8 @@ class Run {
   ReferenceGlide glide_;
   StrideFeedback stride_;
 
-  double time_s_ = 0, busy_s_ = 0, correction_ = 0;
+  double time_s_ = 0, busy_s_ = 0;
+  Eigen::VectorXd correction_;                  // of the muscles
   physics::State state_, reference_, glided_;
   RigidFit fit_;                                // from reference_ to state_
   Eigen::VectorXd activation_;                  // E, of a solver step
@@ -95,6 +96,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       observer_(options.observation, control_s_),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
+      correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
       state_(first_state(target_, curve_)),
       activation_(input.scene.body.edge_count()),
       mean_activation_(activation_.size()),
@@ -139,7 +141,6 @@ void Run::look_at_contacts() {
 
 /// The correction for the coming control step, by what is seen of the body.
 void Run::control() {
-  correction_ = 0;
   if (!options_.correct) return;
   const physics::State& seen = options_.observation.is_exact() ? state_ : observer_.see(state_);
   curve_.at(std::max(0.0, time_s_ - static_cast<double>(observer_.delay_steps()) * control_s_), reference_.x, reference_.v);
@@ -152,7 +153,8 @@ void Run::control() {
   input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
   stride_.apply(time_s_ + 0.5 * control_s_, activation_);
   feedback_ = -activation_;
-  correction_ = corrector_.correct(seen, glided_, contact_, activation_);
+  corrector_.correct(seen, glided_, contact_, activation_);
+  correction_ = corrector_.muscles_now();
   feedback_ += activation_;
 }
 

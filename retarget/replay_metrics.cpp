@@ -9,6 +9,10 @@
 namespace hydrostat::retarget {
 namespace {
 
+constexpr double kBuzz = 10;             // [Hz]
+constexpr double kLeastRange = 1e-3;     // of L: a clip whose skin moves less within the body has no style to lose
+constexpr double kLeastShareOfPoints = 0.1;  // of those that move most: what the least ratio leaves below it
+
 /// Slope of the least-squares line through (x, y).
 double slope(const std::vector<double>& x, const std::vector<double>& y) {
   if (x.size() < 2) return 0;
@@ -68,6 +72,7 @@ ReplayMetrics::ReplayMetrics(const ReplayInput& input, double control_s, long mo
       momentum_(physics::momentum(input.scene.body, start.v)),
       spin_(spin_of(input.scene.body, start)),
       course_(empty_course(most_steps, input.prepared.contacts.patches.size())),
+      fast_(kBuzz, 1 / control_s, input.muscles.fields.cols()),
       highest_(start_com_.y()),
       patch_loaded_(input.prepared.contacts.patches.size(), false) {}
 
@@ -98,7 +103,10 @@ void ReplayMetrics::balance_momentum(const ControlStep& step) {
 void ReplayMetrics::compare_shape(const ControlStep& step) {
   shape_.add(step.fit.rms * step.fit.rms);
   world_.add(((step.state.x - step.reference.x).colwise().squaredNorm() * mass_shares_)(0));
-  correction_.add(step.correction * step.correction);
+  const double muscles = static_cast<double>(std::max<Eigen::Index>(1, step.correction.size()));
+  correction_.add(step.correction.squaredNorm() / muscles);
+  buzz_.add(fast_.next(step.correction).squaredNorm() / muscles);
+  course_.correction[steps_ - 1] = std::sqrt(step.correction.squaredNorm() / muscles);
   const double volume_ratio = physics::volume(input_.scene.body, step.state.x) / rest_volume_;
   report_.volume_error_max = std::max(report_.volume_error_max, std::abs(volume_ratio - 1));
   course_.volume_ratio[steps_ - 1] = volume_ratio;
@@ -124,6 +132,39 @@ void ReplayMetrics::compare_with_clip(const ControlStep& step) {
   for (int p = 0; p < input_.skin_points.count(); ++p) skin.col(p) = input_.skin_points.of(step.state.x, p);
   const double rms = best_rigid_fit(clip_x, skin, even_shares_).rms;
   clip_shape_.add(rms * rms);
+  const auto within_body = [&](const Eigen::Matrix3Xd& points) -> Eigen::Matrix3Xd {
+    const RigidFit fit = best_rigid_fit(points, input_.clip_skin.at(0), even_shares_);
+    return fit.rotation * (points.colwise() - fit.mean_a);
+  };
+  range_.add(within_body(skin));
+  clip_range_.add(within_body(clip_x));
+}
+
+void ReplayMetrics::Range::add(const Eigen::Matrix3Xd& points) {
+  if (count == 0) sum.setZero(3, points.cols()), squares.setZero(points.cols());
+  sum += points;
+  squares += points.colwise().squaredNorm().transpose();
+  ++count;
+}
+
+Eigen::VectorXd ReplayMetrics::Range::squared() const {
+  const double n = static_cast<double>(count);
+  return (squares / n - (sum / n).colwise().squaredNorm().transpose()).cwiseMax(0);
+}
+
+/// Of all points together, and of that one among those that move most which does so least, but for a tenth of them.
+void ReplayMetrics::measure_style(ReplayReport& report) const {
+  if (clip_range_.count < 2) return;
+  const Eigen::VectorXd moved = range_.squared(), in_clip = clip_range_.squared();
+  if (std::sqrt(in_clip.mean()) < kLeastRange * length_) return;
+  report.style_range = std::sqrt(moved.mean() / in_clip.mean());
+  std::vector<double> ratios;
+  for (Eigen::Index p = 0; p < moved.size(); ++p) {
+    if (in_clip[p] >= in_clip.mean()) ratios.push_back(std::sqrt(moved[p] / in_clip[p]));
+  }
+  const auto place = ratios.begin() + static_cast<long>(kLeastShareOfPoints * static_cast<double>(ratios.size()));
+  std::nth_element(ratios.begin(), place, ratios.end());
+  report.style_range_least = *place;
 }
 
 void ReplayMetrics::watch_points(const ControlStep& step) {
@@ -161,7 +202,6 @@ void ReplayMetrics::write_course(const ControlStep& step) {
   course_.time_s[row] = step.time_s;
   course_.height[row] = step.fit.mean_b.y();
   course_.heading_deg[row] = yaw_of(step.fit.rotation) * 180 / M_PI;
-  course_.correction[row] = step.correction;
   course_.saturated[row] =
       (step.activation.array() - 1).abs().unaryExpr([&](double a) { return a > at_limit ? 1.0 : 0.0; }).mean();
   course_.com.col(row) = step.fit.mean_b;
@@ -209,9 +249,11 @@ ReplayReport ReplayMetrics::figures() const {
   report.slip_per_stance_length = slip_ / static_cast<double>(std::max(1L, stances_)) / length_;
   report.sole_gap_length = sole_gap_.value() / length_;
   report.correction_rms = std::sqrt(correction_.value());
+  report.correction_buzz_rms = std::sqrt(buzz_.value());
   measure_drift(report);
   measure_way(report);
   measure_apex(report);
+  measure_style(report);
   return report;
 }
 

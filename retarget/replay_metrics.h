@@ -5,6 +5,7 @@
 #include "retarget/best_fit_rotation.h"
 #include "retarget/contact_loads.h"
 #include "retarget/replay.h"
+#include "signal/high_pass.h"
 
 namespace hydrostat::retarget {
 
@@ -15,7 +16,7 @@ struct ControlStep {
   const physics::State& reference;            // of the target
   const RigidFit& fit;                        // from target to body, by mass
   const Eigen::VectorXd& activation;          // E, as it was held
-  double correction = 0;                      // RMS over the muscles
+  const Eigen::VectorXd& correction;          // of the muscles, an activation each
   const physics::Impulses& impulses;          // of the whole step
   const std::vector<ContactState>& touching;  // P
 };
@@ -41,6 +42,15 @@ class ReplayMetrics {
     double value() const { return count > 0 ? sum / static_cast<double>(count) : 0; }
   };
 
+  /// How far points move about their mean places.
+  struct Range {
+    Eigen::Matrix3Xd sum;
+    Eigen::VectorXd squares;
+    long count = 0;
+    void add(const Eigen::Matrix3Xd& points);
+    Eigen::VectorXd squared() const;  // mean square distance of each [m2]
+  };
+
   void balance_momentum(const ControlStep& step);
   void compare_shape(const ControlStep& step);
   void compare_with_clip(const ControlStep& step);
@@ -51,6 +61,7 @@ class ReplayMetrics {
   void measure_way(ReplayReport& report) const;
   void measure_drift(ReplayReport& report) const;
   void measure_apex(ReplayReport& report) const;
+  void measure_style(ReplayReport& report) const;
 
   const ReplayInput& input_;
   const double control_s_, length_, weight_, period_s_, rest_volume_;
@@ -63,7 +74,9 @@ class ReplayMetrics {
   Eigen::Vector3d momentum_, spin_;  // at the end of the last step
   ReplayReport report_;              // largest values so far
   ReplayCourse course_;
-  Mean shape_, world_, clip_shape_, sole_gap_, correction_;
+  Mean shape_, world_, clip_shape_, sole_gap_, correction_, buzz_;
+  signal::HighPass fast_;
+  Range range_, clip_range_;  // of the skin within the body, as it lies in the clip's first frame
   double slip_ = 0, highest_;
   long stances_ = 0;
   std::vector<bool> patch_loaded_;

@@ -53,7 +53,9 @@ struct ReplayReport {
   double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
   int inverted_elements = 0;  // the most in any control step
   int guard_steps = 0;
-  double correction_rms = 0, real_time_factor = 0;
+  double correction_rms = 0, correction_buzz_rms = 0;  // activations; what of them is faster than 10 Hz
+  double style_range = 1, style_range_least = 1;       // how far the skin moves within the body over how far the clip's does
+  double real_time_factor = 0;
   double apex_rise_length = 0, clip_apex_rise_length = 0;  // of the COM over its height at the start, per L
 };
 

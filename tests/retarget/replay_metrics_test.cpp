@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <string>
 
@@ -12,10 +13,20 @@ namespace {
 
 constexpr double kStep = 1.0 / 120;
 
-/// The box held against a target that stands, one control step after the other.
+/// The box bent sideways, its ends along z by `way` [m] from its middle.
+Eigen::Matrix3Xd swayed(const BoxCreature& creature, double way) {
+  Eigen::Matrix3Xd x = creature.scene.body.rest;
+  const double middle = (x.row(2).minCoeff() + x.row(2).maxCoeff()) / 2, half = x.row(2).maxCoeff() - middle;
+  for (Eigen::Index i = 0; i < x.cols(); ++i) x(0, i) += way * std::pow((x(2, i) - middle) / half, 2);
+  return x;
+}
+
+/// The box held against a target that stands, one control step after the other. Its clip sways by `sway` [m] once a period.
 class Measured {
  public:
-  Measured() : metrics_(input_, kStep, 100, state) { impulses.contact.colwise() = creature.mass() / points() * kStep * up(); }
+  explicit Measured(long frames = 6, double sway = 0) : frames_(frames), sway_(sway), metrics_(input_, kStep, 100, state) {
+    impulses.contact.colwise() = creature.mass() / points() * kStep * up();
+  }
 
   Eigen::Index points() const { return creature.scene.contact_points.count(); }
   Eigen::Vector3d up() const { return -creature.scene.gravity; }
@@ -40,13 +51,24 @@ class Measured {
   physics::State state{creature.scene.body.rest, Eigen::Matrix3Xd::Zero(3, creature.scene.body.node_count())};
   physics::Impulses impulses = physics::make_impulses(creature.scene);
   Eigen::VectorXd activation = Eigen::VectorXd::Ones(creature.scene.body.edge_count());
-  double correction = 0;
+  Eigen::VectorXd correction =
+      Eigen::VectorXd::Zero(make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights).fields.cols());
 
  private:
+  Motion clip() const {
+    Motion nodes = standing(creature, frames_);
+    for (Eigen::Index f = 0; f < nodes.count(); ++f) {
+      nodes.at(f) = swayed(creature, sway_ * std::sin(2 * M_PI * static_cast<double>(f) / static_cast<double>(frames_)));
+    }
+    return point_motion(creature.scene.contact_points, nodes);
+  }
+
+  long frames_;
+  double sway_;
   physics::State target_state_ = state;
   Muscles muscles_ = make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights);
-  PreparedTarget target_ = as_prepared(standing(creature, 6), always_standing(creature, 6));
-  ReplayInput input_{creature.scene, creature.scene, target_, muscles_, {}, point_motion(creature.scene.contact_points, target_.target),
+  PreparedTarget target_ = as_prepared(standing(creature, frames_), always_standing(creature, frames_));
+  ReplayInput input_{creature.scene, creature.scene, target_, muscles_, {}, clip(),
                      creature.scene.contact_points, 0, BoxCreature::kLength, creature.size(), 0.3};
   ReplayMetrics metrics_;
   int steps_ = 0;
@@ -65,6 +87,32 @@ TEST(ReplayMetrics, ABodyThatIsItsTargetHasNoError) {
   }
   EXPECT_EQ(report.inverted_elements, 0);
   EXPECT_EQ(run.course().time_s.size(), 60);
+}
+
+TEST(ReplayMetrics, ACreatureThatMovesLessThanItsClipLosesStyle) {
+  constexpr double kSway = 0.05;
+  for (const double share : {1.0, 0.5, 0.0, 1.5}) {
+    Measured run(48, kSway);
+    for (int k = 1; k <= 96; ++k) {
+      run.state.x = swayed(run.creature, share * kSway * std::sin(2 * M_PI * k / 96));
+      run.step();
+    }
+    EXPECT_NEAR(run.figures().style_range, share, 0.03);
+    EXPECT_NEAR(run.figures().style_range_least, share, 0.06);
+  }
+}
+
+TEST(ReplayMetrics, OfTheCorrectionWhatIsFastIsTold) {
+  for (const double hz : {1.0, 40.0}) {
+    Measured run;
+    for (int k = 1; k <= 96; ++k) {
+      run.correction.setConstant(0.1 * std::sin(2 * M_PI * hz * k * kStep));
+      run.step();
+    }
+    const ReplayReport report = run.figures();
+    EXPECT_GT(report.correction_rms, 0.05);
+    EXPECT_NEAR(report.correction_buzz_rms / report.correction_rms, hz > 10 ? 1 : 0, 0.1) << hz;
+  }
 }
 
 TEST(ReplayMetrics, AnElementThatInvertsForOneStepIsNotForgotten) {

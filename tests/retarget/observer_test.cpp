@@ -1,0 +1,52 @@
+#include "retarget/observer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kStep = 1.0 / 120;
+constexpr int kNodes = 50;
+
+physics::State at_step(int k) {
+  return {Eigen::Matrix3Xd::Constant(3, kNodes, k), Eigen::Matrix3Xd::Constant(3, kNodes, -k)};
+}
+
+TEST(Observer, SeesTheBodyAsItWas) {
+  for (const int delay : {0, 1, 2, 5}) {
+    Observer observer({.delay_s = delay * kStep}, kStep);
+    EXPECT_EQ(observer.delay_steps(), delay);
+    for (int k = 0; k < 20; ++k) {
+      const physics::State& seen = observer.see(at_step(k));
+      EXPECT_EQ(seen.x(0, 0), std::max(0, k - delay));
+      EXPECT_EQ(seen.v(2, kNodes - 1), -std::max(0, k - delay));
+    }
+  }
+}
+
+TEST(Observer, NoiseHasItsSizeIsSmoothAndMovesAsItsVelocitySays) {
+  constexpr double kNoise = 0.01;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    Observer observer({.noise_m = kNoise, .seed = seed}, kStep), again({.noise_m = kNoise, .seed = seed}, kStep);
+    double squares = 0;
+    Eigen::Matrix3Xd place, speed;
+    constexpr int kSteps = 1200;
+    for (int k = 0; k < kSteps; ++k) {
+      const physics::State still{Eigen::Matrix3Xd::Zero(3, kNodes), Eigen::Matrix3Xd::Zero(3, kNodes)};
+      const physics::State& seen = observer.see(still);
+      EXPECT_EQ(seen.x, again.see(still).x);
+      squares += seen.x.squaredNorm() / static_cast<double>(seen.x.size());
+      if (k > 0) {
+        EXPECT_LT((seen.x - place - kStep / 2 * (seen.v + speed)).cwiseAbs().maxCoeff(), 0.15 * kNoise);
+      }
+      place = seen.x;
+      speed = seen.v;
+    }
+    EXPECT_NEAR(std::sqrt(squares / kSteps), kNoise, 0.05 * kNoise);
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

@@ -20,7 +20,7 @@ class Normals {
   Normals(const std::vector<Appearance::Part>& parts, const Eigen::Matrix3Xd& bind_pose) {
     std::map<std::array<long, 4>, int> numbers;
     for (const Appearance::Part& part : parts) {
-      Eigen::VectorXi mine(part.vertices.size());
+      Eigen::VectorXi mine(part.normals.cols());  // none of a flat part
       for (Eigen::Index d = 0; d < mine.size(); ++d) {
         std::array<long, 4> key{part.vertices[d], 0, 0, 0};
         for (int axis = 0; axis < 3; ++axis)
@@ -30,7 +30,7 @@ class Normals {
         mine[d] = place->second;
       }
       for (const auto corners : part.triangles.colwise()) {
-        for (int k = 0; k < 3; ++k) corners_.emplace_back(part.vertices[corners[k]], mine[corners[k]]);
+        for (int k = 0; k < 3 && mine.size() > 0; ++k) corners_.emplace_back(part.vertices[corners[k]], mine[corners[k]]);
       }
       of_parts_.push_back(std::move(mine));
     }
@@ -91,10 +91,8 @@ MovingNormals fit_normals(const std::vector<Appearance::Part>& parts, const Skin
                           const std::vector<Eigen::Quaterniond>& turns, const std::vector<Eigen::Matrix3Xd>& shapes,
                           const Eigen::MatrixXd& shape_weights) {
   MovingNormals result;
-  for (const Appearance::Part& part : parts) {
-    if (part.normals.cols() == 0) return result;
-  }
   const Normals normals(parts, skin.bind_pose);
+  if (normals.count() == 0) return result;
   Eigen::MatrixXd of_shapes(3 * normals.count(), static_cast<Eigen::Index>(shapes.size()));
   for (std::size_t k = 0; k < shapes.size(); ++k) {
     of_shapes.col(static_cast<Eigen::Index>(k)) =

@@ -20,13 +20,13 @@ struct SkinCourse {
 struct MovingNormals {
   std::vector<std::vector<Eigen::Matrix3Xd>> targets;    // K x parts; 3 x D each
   Eigen::MatrixXd weights;                               // K x F, in -1..1
-  std::vector<std::vector<Eigen::Matrix3Xd>> of_shapes;  // of each shape x parts; none where a part is flat
+  std::vector<std::vector<Eigen::Matrix3Xd>> of_shapes;  // of each shape x parts
 };
 
 /// Fits at most eight targets to the normals of the moved surface (the mean of the triangles around, weighted by area; drawn
 /// vertices of one place that share a normal in the bind pose go on sharing it): the principal components of their offsets,
-/// as many as it takes to bring these to 2 degrees (RMS). None where a part is flat, so that its normals need no help, or
-/// the body moves as a whole. `turns`: of each frame, F. `shapes`, 3 x V each in the bind pose, are what moves the skin by
+/// as many as it takes to bring these to 2 degrees (RMS). None where the body moves as a whole. A flat part,
+/// whose normals need no help, has 3 x 0 of each. `turns`: of each frame, F. `shapes`, 3 x V each in the bind pose, are what moves the skin by
 /// `shape_weights` (S x F) within the course: each gets normals of its own, and the targets are fitted to the rest.
 /// Source: Alexa and Müller, "Representing Animations by Principal Components", Eurographics 2000.
 MovingNormals fit_normals(const std::vector<Appearance::Part>& parts, const SkinCourse& skin,

@@ -275,6 +275,28 @@ TEST(WriteSkinnedGlb, NormalsBendWithTheBody) {
   EXPECT_GT(normal_error(model, creature, 4, false), 0.3) << "the turn of the whole would do: the test tests nothing";
 }
 
+TEST(WriteSkinnedGlb, NormalsBendBesideAPartThatIsFlat) {
+  const Creature creature = bar({0, 0.5, 1, 1.5, 2, 1, -0.5, -1.5});
+  Appearance looks;
+  looks.parts.resize(2);
+  for (std::size_t p = 0; p < 2; ++p) {
+    Appearance::Part& part = looks.parts[p];
+    part.vertices = Eigen::VectorXi::LinSpaced(creature.vertices.cols(), 0, static_cast<int>(creature.vertices.cols()) - 1);
+    part.triangles = p == 0 ? creature.triangles : creature.triangles.leftCols(8);
+  }
+  looks.parts[0].normals = surface_normals(creature.vertices, creature.triangles);
+  const auto write_to = [&](const fs::path& path) {
+    write_skinned_glb(path, {creature.vertices, creature.triangles, creature.embedding, &looks}, creature.body, creature.mass,
+                      creature.motion, {});
+  };
+  write_to(scratch("half_flat"));
+  const tinygltf::Model model = load(scratch("half_flat"));
+  for (Eigen::Index f = 0; f < creature.motion.count(); ++f) EXPECT_LT(normal_error(model, creature, f, true), 0.07);
+  const auto& primitives = model.meshes[0].primitives;
+  ASSERT_EQ(primitives[0].targets.size(), primitives[1].targets.size()) << "as glTF wants";
+  EXPECT_FALSE(primitives[1].targets[0].contains("NORMAL"));
+}
+
 TEST(WriteSkinnedGlb, NormalsOfARigidBodyNeedNoHelp) {
   write(scratch("rigid"), bar({0, 0, 0}));
   EXPECT_TRUE(load(scratch("rigid")).meshes[0].primitives[0].targets.empty());

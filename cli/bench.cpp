@@ -13,6 +13,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   add_bench_accuracy(*bench, exit_code);
   add_bench_effects(*bench, exit_code);
   add_bench_scaling(*bench, exit_code);
+  add_bench_speed(*bench, exit_code);
   add_bench_import(*bench, exit_code);
 }
 

@@ -10,5 +10,6 @@ namespace hydrostat::cli {
 void add_bench_accuracy(CLI::App& bench, int& exit_code);
 void add_bench_effects(CLI::App& bench, int& exit_code);
 void add_bench_scaling(CLI::App& bench, int& exit_code);
+void add_bench_speed(CLI::App& bench, int& exit_code);
 
 }  // namespace hydrostat::cli

@@ -9,6 +9,7 @@
 #include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
 #include "cli/import_options.h"
+#include "cli/make_performer.h"
 #include "cli/number_option.h"
 #include "cli/outcome.h"
 #include "cli/stages.h"
@@ -25,7 +26,6 @@
 #include "retarget/flight.h"
 #include "retarget/limbs.h"
 #include "retarget/run_warnings.h"
-#include "retarget/self_contact_plan.h"
 
 namespace hydrostat::cli {
 
@@ -127,51 +127,11 @@ io::ImportedCharacter import(const ConvertOptions& options) {
   return imported;
 }
 
-retarget::SignalSet solved_signals(const retarget::InverseDynamics& inverse, const retarget::Performer& performer,
-                                   const std::string& file, const std::string& clip) {
-  const physics::Body& body = performer.scene.body;
-  const retarget::Motion& target = performer.prepared.target;
-  const retarget::SolvedSignals solved{target.loop ? signal::Kind::loop : signal::Kind::one_shot,
-                                       target.duration_s(),
-                                       inverse.report.limit,
-                                       inverse.activation.transpose(),
-                                       inverse.penalty_force.transpose(),
-                                       performer.muscles.edge_bone,
-                                       body.edges,
-                                       body.rest_length,
-                                       body.edge_stiffness};
-  const std::string broken = retarget::broken_rule({}, solved.kind, static_cast<int>(solved.activation.rows()));
-  if (!broken.empty()) throw Error(file, "clip '" + clip + "'", broken, "Give a longer clip.");
-  return retarget::analyse_signals(solved, {});
-}
-
 /// Layers of the creature that is about to be replaced; a sentence for each that does not fit any more.
 std::vector<std::string> keep_earlier_layers(const fs::path& creature, retarget::SignalSet& signals) {
   const fs::path file = creature / "signals.json";
   if (!io::is_creature(creature) || !fs::exists(file)) return {};
   return retarget::keep_layers(io::read_signals(file), signals);
-}
-
-retarget::Performer make_performer(const retarget::Creature& creature, const retarget::ImportedMotion& motion,
-                                   retarget::PreparedTarget prepared) {
-  retarget::Performer performer;
-  performer.skin.vertices = creature.character.skin.vertices;
-  performer.skin.triangles = creature.character.skin.triangles;
-  performer.embedding = creature.skin;
-  performer.mesh = creature.mesh;
-  performer.contacts = creature.contacts;
-  performer.scene = creature.scene;
-  performer.muscles = retarget::make_muscles(creature.scene.body, creature.character.skeleton, creature.mesh.bone_weights);
-  performer.prepared = std::move(prepared);
-  performer.clip_points = motion.skin_points;
-  performer.clip_skin = motion.skin;
-  performer.clip_rise = retarget::apex_rise(retarget::com_path(motion.nodes, creature.scene.body.mass));
-  performer.length = creature.length;
-  performer.size = creature.size;
-  retarget::SelfContactPlan plan = retarget::plan_self_contact(performer);
-  performer.scene.self_contact = std::move(plan.settings);
-  performer.self_contact_reason = std::move(plan.reason);
-  return performer;
 }
 
 retarget::SourceReport source_report(const ConvertOptions& options, const retarget::Creature& creature,
@@ -384,10 +344,12 @@ class Conversion {
       writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                                dominant_bones_of_nodes(creature_.mesh.bone_weights)));
       writer_.write("target.bin", target_file_);
+      if (!performer.morphs.targets.empty()) writer_.write("morphs.bin", io::morphs_bytes(performer.morphs));
       if (!appearance_.parts.empty()) writer_.write("appearance.bin", io::appearance_bytes(appearance_));
       writer_.write("signals.json", signals_text_);
       io::write_skinned_glb(writer_.directory() / "reference.glb",
-                            {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance_},
+                            {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance_,
+                             &performer.morphs},
                             performer.mesh, performer.scene.body.mass, performer.prepared.target, {});
       return 0;
     });

@@ -42,6 +42,9 @@ void print_clip(const io::ClipInfo& clip) {
     std::printf("  travels at %.3g m/s\n", clip.speed_m_s);
   }
   if (clip.max_strain > 0) std::printf("  asks the skin to change its lengths by up to %.0f %%\n", 100 * clip.max_strain);
+  for (const io::MorphInfo& morph : clip.morphs)
+    std::printf("  moves morph target '%s' of '%s': %.3g to %.3g\n", morph.name.c_str(), morph.mesh.c_str(), morph.min,
+                morph.max);
   for (const io::ContactInfo& contact : clip.contacts) {
     std::printf("  on the ground: %s, %.0f %% of the time:", contact.bone.c_str(), 100 * contact.duty);
     for (const auto& [from_s, until_s] : contact.times_s) std::printf(" %.2f-%.2f", from_s, until_s);
@@ -63,6 +66,10 @@ void print(const io::FileInfo& info) {
   for (const io::MeshInfo& mesh : info.meshes) {
     std::printf("mesh '%s': %d vertices, %d triangles%s\n", mesh.name.c_str(), mesh.vertices, mesh.triangles,
                 mesh.skinned ? "" : ", not bound to bones");
+    if (mesh.morphs.empty()) continue;
+    std::string names;
+    for (const std::string& name : mesh.morphs) names += (names.empty() ? "" : ", ") + name;
+    std::printf("  morph targets: %s\n", names.c_str());
   }
   for (const io::ClipInfo& clip : info.clips) print_clip(clip);
   for (const std::string& warning : info.warnings) std::printf("warning: %s\n", warning.c_str());

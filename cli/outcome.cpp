@@ -30,7 +30,7 @@ void write_outcome(io::CreatureWriter& writer, const retarget::Performer& perfor
   const retarget::Replay& run = performances.main();
   const bool down = !report.outcome_ok;
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
-                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance},
+                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &performer.morphs},
                         performer.mesh, performer.scene.body.mass, run.motion, {});
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));

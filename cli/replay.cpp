@@ -102,7 +102,7 @@ int write_motion(const ReplayCommand& command, const retarget::Performer& perfor
                  const retarget::Performances& performances) {
   const retarget::Replay& run = performances.main();
   const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
-  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance},
+  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &performer.morphs},
                         performer.mesh, performer.scene.body.mass, run.motion, {});
   return tell_run(run, command.directory, file.string());
 }

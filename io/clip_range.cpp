@@ -43,14 +43,16 @@ std::size_t find_clip(const Scene& scene, const std::string& wanted, const std::
 
 ClipRange range_of(const SceneClip& clip) {
   double first = std::numeric_limits<double>::infinity(), last = -first, rate = 0;
+  const auto take_in = [&](const Track& track) {
+    if (track.times.size() < 2) return;
+    first = std::min(first, track.times.front());
+    last = std::max(last, track.times.back());
+    rate = std::max(rate, static_cast<double>(track.times.size() - 1) / (track.times.back() - track.times.front()));
+  };
   for (const Channel& channel : clip.channels) {
-    for (const Track* track : {&channel.translation, &channel.rotation, &channel.scale}) {
-      if (track->times.size() < 2) continue;
-      first = std::min(first, track->times.front());
-      last = std::max(last, track->times.back());
-      rate = std::max(rate, static_cast<double>(track->times.size() - 1) / (track->times.back() - track->times.front()));
-    }
+    for (const Track* track : {&channel.translation, &channel.rotation, &channel.scale}) take_in(*track);
   }
+  for (const MorphChannel& channel : clip.morphs) take_in(channel.weight);
   first = std::max(first, 0.0);
   if (clip.duration_s > 0) last = std::min(last, clip.duration_s);
   if (!(last > first)) return {};

@@ -22,7 +22,7 @@ constexpr double kShortestEdge = 0.01;  // of L: shorter ones are creases of the
 /// The skinned vertices [m], or the joints where there is no mesh, at a time of the clip.
 Eigen::Matrix3Xd points_at(const Rig& rig, const Scene& scene, const SceneClip& clip, double time_s) {
   const std::vector<Eigen::Affine3d> pose = bone_poses(rig, scene, clip, time_s);
-  if (rig.skin.vertices.cols() > 0) return skin_positions(rig.skeleton, rig.skin, pose);
+  if (rig.skin.vertices.cols() > 0) return skin_positions(rig.skeleton, rig.skin, pose, morph_weights(rig, clip, time_s));
   Eigen::Matrix3Xd joints(3, static_cast<Eigen::Index>(pose.size()));
   for (std::size_t b = 0; b < pose.size(); ++b) joints.col(static_cast<Eigen::Index>(b)) = pose[b].translation();
   return joints;
@@ -177,6 +177,19 @@ void describe_contacts(const Rig& rig, const Scene& scene, const SceneClip& clip
   info.contacts = contacts_of(body, frames_of(body, scene, clip, range), length, range.length_s());
 }
 
+std::vector<MorphInfo> morphs_of(const Scene& scene, const SceneClip& clip) {
+  std::vector<MorphInfo> morphs;
+  for (const MorphChannel& channel : clip.morphs) {
+    const auto mesh = std::find_if(scene.meshes.begin(), scene.meshes.end(), [&](const SceneMesh& other) {
+      return other.node == channel.node && static_cast<std::size_t>(channel.target) < other.morphs.size();
+    });
+    if (mesh == scene.meshes.end()) continue;  // left out
+    morphs.push_back({mesh->name, mesh->morphs[static_cast<std::size_t>(channel.target)].name,
+                      channel.weight.values.minCoeff(), channel.weight.values.maxCoeff()});
+  }
+  return morphs;
+}
+
 void describe_travel(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range, ClipInfo& info) {
   const std::vector<Eigen::Matrix3Xd> frames = frames_of(rig, scene, clip, range);
   const Eigen::Matrix3Xd& first = frames.front();
@@ -205,6 +218,7 @@ ClipInfo describe_clip(const Rig& rig, const Scene& scene, std::size_t index) {
   info.duration_s = clip.duration_s > 0 ? clip.duration_s : range.end_s;
   info.range_s = range.length_s();
   info.rate_hz = range.key_rate_hz;
+  info.morphs = morphs_of(scene, clip);
   if (info.range_s >= kShortestClip) describe_travel(rig, scene, clip, range, info);
   for (const double fraction : kFractions) {
     double time_s = fraction * info.duration_s;

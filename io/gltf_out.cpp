@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "io/gltf_materials.h"
+#include "io/moving_morphs.h"
 #include "io/moving_normals.h"
 #include "io/write_file.h"
 #include "retarget/best_fit_rotation.h"
@@ -265,29 +266,55 @@ tinygltf::AnimationChannel channel(int sampler, int target, const char* path) {
   return result;
 }
 
-/// Normals that bend with the body, as targets of the mesh and their weights over time. They tell of positions too, that
-/// these stay: three.js 0.170 cannot draw targets without.
-void add_moving_normals(tinygltf::Model& model, BufferWriter& buffer, const MovingNormals& normals, int time,
-                        tinygltf::Animation& animation) {
-  if (normals.targets.empty()) return;
+/// Morph targets and, behind them, normals that bend with the body: targets of the mesh and their weights over time. Those of
+/// normals tell of positions too, that these stay: three.js 0.170 cannot draw targets without.
+void add_targets(tinygltf::Model& model, BufferWriter& buffer, const std::vector<Appearance::Part>& parts,
+                 const PlayedMorphs& morphs, const MovingNormals& normals, int time, tinygltf::Animation& animation) {
+  const std::size_t shapes = morphs.shapes.size(), count = shapes + normals.targets.size();
+  if (count == 0) return;
   tinygltf::Mesh& mesh = model.meshes.front();
   for (std::size_t p = 0; p < mesh.primitives.size(); ++p) {
-    const std::vector<float> nowhere(static_cast<std::size_t>(normals.targets.front()[p].size()), 0.0f);
+    const std::vector<float> nowhere(static_cast<std::size_t>(3 * parts[p].vertices.size()), 0.0f);
     const int still = buffer.array(nowhere, TINYGLTF_TARGET_ARRAY_BUFFER, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
     buffer.set_bounds(still, nowhere);
+    for (std::size_t k = 0; k < shapes; ++k) {
+      const Eigen::Matrix3Xd offsets = morphs.shapes[k](Eigen::all, parts[p].vertices);
+      tinygltf::Primitive target;
+      add_positions(buffer, offsets, target);
+      if (!normals.of_shapes.empty()) {
+        add_property(buffer, "NORMAL", normals.of_shapes[k][p], TINYGLTF_TYPE_VEC3, target.attributes);
+      }
+      mesh.primitives[p].targets.push_back(target.attributes);
+    }
     for (const std::vector<Eigen::Matrix3Xd>& target : normals.targets) {
       std::map<std::string, int>& properties = mesh.primitives[p].targets.emplace_back();
       properties["POSITION"] = still;
       add_property(buffer, "NORMAL", target[p], TINYGLTF_TYPE_VEC3, properties);
     }
   }
-  mesh.weights.assign(normals.targets.size(), 0.0);
+  mesh.weights.assign(count, 0.0);
+  Eigen::MatrixXd weights(static_cast<Eigen::Index>(count), std::max(morphs.weights.cols(), normals.weights.cols()));
+  weights.topRows(morphs.weights.rows()) = morphs.weights;
+  weights.bottomRows(normals.weights.rows()) = normals.weights;
   tinygltf::AnimationSampler sampler;
   sampler.input = time;
-  sampler.output = buffer.array(floats(normals.weights), 0, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR);
+  sampler.output = buffer.array(floats(weights), 0, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR);
   sampler.interpolation = "LINEAR";
   animation.samplers.push_back(sampler);
   animation.channels.push_back(channel(static_cast<int>(animation.samplers.size()) - 1, 0, "weights"));
+  if (shapes == 0) return;
+  tinygltf::Value::Array names;
+  for (const std::string& name : morphs.names) names.emplace_back(name);
+  for (std::size_t k = 0; k < normals.targets.size(); ++k) names.emplace_back("normals " + std::to_string(k + 1));
+  mesh.extras = tinygltf::Value(tinygltf::Value::Object{{"targetNames", tinygltf::Value(names)}});
+}
+
+Eigen::Matrix3Xd embedded(const retarget::Embedding& embedding, const Eigen::Ref<const Eigen::Matrix3Xd>& nodes) {
+  Eigen::Matrix3Xd vertices = Eigen::Matrix3Xd::Zero(3, embedding.nodes.cols());
+  for (Eigen::Index v = 0; v < vertices.cols(); ++v) {
+    for (int k = 0; k < 4; ++k) vertices.col(v) += embedding.weights(k, v) * nodes.col(embedding.nodes(k, v));
+  }
+  return vertices;
 }
 
 void add_animation(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin,
@@ -330,7 +357,18 @@ void add_animation(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedS
     animation.channels.push_back(channel(add_sampler(path), 2 + n, "translation"));
     animation.channels.push_back(channel(turning, 2 + n, "rotation"));
   }
-  add_moving_normals(model, buffer, fit_normals(parts, body.nodes, skin.embedding, motion, rotations), time, animation);
+  const PlayedMorphs morphs = skin.morphs == nullptr ? PlayedMorphs()
+                                                     : play_morphs(*skin.morphs, skin.embedding, body, motion, rotations);
+  const auto skin_at = [&](Eigen::Index f) {
+    Eigen::Matrix3Xd vertices = embedded(skin.embedding, motion.at(f));
+    const Eigen::Matrix3d turn = rotations[static_cast<std::size_t>(f)].toRotationMatrix();
+    for (std::size_t k = 0; k < morphs.shapes.size(); ++k)
+      vertices += morphs.weights(static_cast<Eigen::Index>(k), f) * (turn * morphs.shapes[k]);
+    return vertices;
+  };
+  const SkinCourse course{embedded(skin.embedding, body.nodes), skin_at, motion.count()};
+  add_targets(model, buffer, parts, morphs, fit_normals(parts, course, rotations, morphs.shapes, morphs.weights), time,
+              animation);
   model.animations.push_back(animation);
 }
 

@@ -6,6 +6,7 @@
 
 #include "io/appearance.h"
 #include "retarget/control_mesh.h"
+#include "retarget/morphs.h"
 #include "retarget/motion.h"
 
 namespace hydrostat::io {
@@ -22,6 +23,7 @@ struct EmbeddedSkin {
   const Eigen::Matrix3Xi& triangles;       // 3 x T
   const retarget::Embedding& embedding;    // of the V vertices in the control mesh
   const Appearance* appearance = nullptr;  // null, or without parts: one colour, and normals of the smooth surface
+  const retarget::MovingMorphs* morphs = nullptr;  // worn over what the body carries; null, or without targets: nothing
 };
 
 /// Writes a binary glTF 2.0 file in which the fine skin moves with the control nodes: one joint per node, keyed with the
@@ -31,6 +33,7 @@ struct EmbeddedSkin {
 /// the embedded position exactly, between keys too, where v_bind is the same weighted sum of rest nodes; what the embedding
 /// misses it by turns with R, as the normals do. Where the body bends, these follow by targets that move normals alone, no
 /// position (io/moving_normals.h): without them one would be off by as much as its limb is from R.
+/// Morph targets are the file's by name (`extras.targetNames`), turned with the body around them (io/moving_morphs.h).
 /// With an appearance each of its parts is a primitive, flat ones without normals, and its images lie in the file as they
 /// are. A loop gets its first frame, moved on by one period, as last key. Numbers are float32. Throws Error when the file
 /// cannot be written, or for a body of more than 65536 nodes (glTF's joint indices).

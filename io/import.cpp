@@ -87,14 +87,33 @@ retarget::Clip sample(const Rig& rig, const Scene& scene, std::size_t index, con
   if (static_cast<double>(intervals) * static_cast<double>(rig.scene_nodes.size()) > kMostPoses) {
     throw Error(path, "clip '" + clip.name + "'", "it is too long for so many bones", "Cut it into shorter clips");
   }
+  const auto morphs = static_cast<Eigen::Index>(rig.morph_sources.size());
+  if (static_cast<double>(intervals) * static_cast<double>(morphs) > kMostPoses)
+    throw Error(path, "clip '" + clip.name + "'", "it is too long for so many morph targets", "Cut it into shorter clips");
+  clip.morph_weights.resize(morphs, intervals + 1);
   for (int f = 0; f <= intervals; ++f) {
-    clip.bone_pose.push_back(bone_poses(rig, scene, source, range.start_s + clip.range_s * f / intervals));
+    const double time_s = range.start_s + clip.range_s * f / intervals;
+    clip.bone_pose.push_back(bone_poses(rig, scene, source, time_s));
+    clip.morph_weights.col(f) = morph_weights(rig, source, time_s);
   }
   return clip;
 }
 
+/// Keeps the morph targets that this clip moves.
+void forget_still_morphs(retarget::SkinnedMesh& skin, retarget::Clip& clip) {
+  std::vector<int> moving;
+  for (int k = 0; k < clip.morph_weights.rows(); ++k) {
+    if (clip.morph_weights.row(k).isZero(0)) continue;
+    skin.morphs[moving.size()] = skin.morphs[static_cast<std::size_t>(k)];
+    moving.push_back(k);
+  }
+  skin.morphs.resize(moving.size());
+  clip.morph_weights = moving.empty() ? Eigen::MatrixXd() : Eigen::MatrixXd(clip.morph_weights(moving, Eigen::all));
+}
+
 void require_finite(const retarget::Character& character, const std::string& path) {
-  bool finite = character.skin.vertices.allFinite();
+  bool finite = character.skin.vertices.allFinite() && character.clip.morph_weights.allFinite();
+  for (const retarget::MorphTarget& morph : character.skin.morphs) finite = finite && morph.offsets.allFinite();
   for (const std::vector<Eigen::Affine3d>& frame : character.clip.bone_pose) {
     for (const Eigen::Affine3d& pose : frame) finite = finite && pose.matrix().allFinite();
   }
@@ -126,6 +145,8 @@ retarget::Character import_character(const std::string& path, const std::string&
   for (Eigen::Affine3d& bind : character.skeleton.bind_pose) bind = upright * bind;
   character.skin = std::move(rig.skin);
   character.skin.vertices = upright * character.skin.vertices;
+  for (retarget::MorphTarget& morph : character.skin.morphs) morph.offsets = upright.linear() * morph.offsets;
+  forget_still_morphs(character.skin, character.clip);
   make_bone_space_rigid(character.skeleton, character.clip);
   require_finite(character, path);
   if (warnings) {

@@ -42,6 +42,7 @@ struct MeshInfo {
   std::string name;
   int vertices = 0, triangles = 0;  // as the reader delivers them, not welded
   bool skinned = false;
+  std::vector<std::string> morphs;  // names of its morph targets
 };
 
 /// Box [m] of the skinned vertices (of the joints where there is no mesh), y up, at a fraction of the clip's duration (of
@@ -59,6 +60,12 @@ struct ContactInfo {
   std::vector<std::pair<double, double>> times_s;  // from, until; 0 is the first key
 };
 
+/// A morph target that a clip moves.
+struct MorphInfo {
+  std::string mesh, name;
+  double min = 0, max = 0;  // weight [-] over its keys
+};
+
 struct ClipInfo {
   int index = 0;
   std::string name;
@@ -73,6 +80,7 @@ struct ClipInfo {
   double max_strain =
       0;  // of the skin's edges against the bind pose: the 99th percentile, the most over the clip; 0 without a mesh
   std::vector<ContactInfo> contacts;
+  std::vector<MorphInfo> morphs;
   std::vector<BoxInfo> bbox;
 };
 

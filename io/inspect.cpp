@@ -68,8 +68,9 @@ FileInfo inspect(const std::string& path, const ImportOptions& options) {
                           rig.skeleton.weighted[b]});
   }
   for (const SceneMesh& mesh : scene.meshes) {
-    info.meshes.push_back(
-        {mesh.name, static_cast<int>(mesh.vertices.cols()), static_cast<int>(mesh.triangles.cols()), !mesh.joints.empty()});
+    info.meshes.push_back({mesh.name, static_cast<int>(mesh.vertices.cols()), static_cast<int>(mesh.triangles.cols()),
+                           !mesh.joints.empty(), {}});
+    for (const SceneMesh::Morph& morph : mesh.morphs) info.meshes.back().morphs.push_back(morph.name);
   }
   for (std::size_t c = 0; c < scene.clips.size(); ++c) {
     deadline.check();
@@ -105,8 +106,11 @@ Json json_of(const FileInfo& info) {
                              {"weighted", bone.weighted}});
   }
   for (const MeshInfo& mesh : info.meshes) {
-    json["meshes"].push_back(
-        {{"name", mesh.name}, {"vertices", mesh.vertices}, {"triangles", mesh.triangles}, {"skinned", mesh.skinned}});
+    json["meshes"].push_back({{"name", mesh.name},
+                              {"vertices", mesh.vertices},
+                              {"triangles", mesh.triangles},
+                              {"skinned", mesh.skinned},
+                              {"morph_targets", mesh.morphs}});
   }
   for (const ClipInfo& clip : info.clips) {
     Json boxes = Json::array();
@@ -118,6 +122,9 @@ Json json_of(const FileInfo& info) {
       for (const auto& [from_s, until_s] : contact.times_s) times.push_back({from_s, until_s});
       contacts.push_back({{"bone", contact.bone}, {"duty", contact.duty}, {"times_s", times}});
     }
+    Json morphs = Json::array();
+    for (const MorphInfo& morph : clip.morphs)
+      morphs.push_back({{"mesh", morph.mesh}, {"name", morph.name}, {"min", morph.min}, {"max", morph.max}});
     json["clips"].push_back({{"index", clip.index},
                              {"name", clip.name},
                              {"duration_s", clip.duration_s},
@@ -130,6 +137,7 @@ Json json_of(const FileInfo& info) {
                              {"closure_defect_length", clip.closure_defect_length},
                              {"max_strain", clip.max_strain},
                              {"contacts", contacts},
+                             {"morph_targets", morphs},
                              {"bbox", boxes}});
   }
   json["warnings"] = info.warnings;

@@ -61,6 +61,11 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
     loaded.appearance = parse_appearance(read_file(appearance_file), appearance_file.string(),
                                          loaded.target.performer.skin.vertices.cols());
   }
+  const std::filesystem::path morphs_file = creature / "morphs.bin";
+  if (std::filesystem::exists(morphs_file)) {
+    loaded.target.performer.morphs =
+        parse_morphs(read_file(morphs_file), morphs_file.string(), loaded.target.performer.skin.vertices.cols());
+  }
   retarget::SelfContactPlan plan = retarget::plan_self_contact(loaded.target.performer);
   loaded.target.performer.scene.self_contact = std::move(plan.settings);
   loaded.target.performer.self_contact_reason = std::move(plan.reason);

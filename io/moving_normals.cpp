@@ -1,10 +1,11 @@
 #include "io/moving_normals.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+
+#include "io/principal_directions.h"
 
 namespace hydrostat::io {
 namespace {
@@ -19,7 +20,7 @@ class Normals {
   Normals(const std::vector<Appearance::Part>& parts, const Eigen::Matrix3Xd& bind_pose) {
     std::map<std::array<long, 4>, int> numbers;
     for (const Appearance::Part& part : parts) {
-      Eigen::VectorXi mine(part.vertices.size());
+      Eigen::VectorXi mine(part.normals.cols());  // none of a flat part
       for (Eigen::Index d = 0; d < mine.size(); ++d) {
         std::array<long, 4> key{part.vertices[d], 0, 0, 0};
         for (int axis = 0; axis < 3; ++axis)
@@ -29,7 +30,7 @@ class Normals {
         mine[d] = place->second;
       }
       for (const auto corners : part.triangles.colwise()) {
-        for (int k = 0; k < 3; ++k) corners_.emplace_back(part.vertices[corners[k]], mine[corners[k]]);
+        for (int k = 0; k < 3 && mine.size() > 0; ++k) corners_.emplace_back(part.vertices[corners[k]], mine[corners[k]]);
       }
       of_parts_.push_back(std::move(mine));
     }
@@ -37,7 +38,17 @@ class Normals {
   }
 
   Eigen::Index count() const { return static_cast<Eigen::Index>(bind_.size()); }
-  const std::vector<Eigen::VectorXi>& of_parts() const { return of_parts_; }
+
+  /// Vectors x y z by normal as those of each part's drawn vertices, 3 x D each.
+  std::vector<Eigen::Matrix3Xd> by_part(const Eigen::VectorXd& vectors) const {
+    std::vector<Eigen::Matrix3Xd> result;
+    for (const Eigen::VectorXi& mine : of_parts_) {
+      Eigen::Matrix3Xd own(3, mine.size());
+      for (Eigen::Index d = 0; d < mine.size(); ++d) own.col(d) = vectors.segment<3>(3 * mine[d]);
+      result.push_back(std::move(own));
+    }
+    return result;
+  }
 
   /// Offsets from the bind pose's normals, x y z by normal, when the skin lies at `vertices` and `turn` is taken out. What
   /// the clip file's normals are off the surface's in the bind pose they stay.
@@ -74,57 +85,37 @@ class Normals {
   Eigen::Matrix3Xd surface_bind_;
 };
 
-Eigen::Matrix3Xd skin_at(const retarget::Embedding& embedding, const Eigen::Ref<const Eigen::Matrix3Xd>& nodes) {
-  Eigen::Matrix3Xd vertices = Eigen::Matrix3Xd::Zero(3, embedding.nodes.cols());
-  for (Eigen::Index v = 0; v < vertices.cols(); ++v) {
-    for (int k = 0; k < 4; ++k) vertices.col(v) += embedding.weights(k, v) * nodes.col(embedding.nodes(k, v));
-  }
-  return vertices;
-}
-
-/// Directions (orthonormal columns) that hold most of the columns of `samples`.
-Eigen::MatrixXd principal_directions(const Eigen::MatrixXd& samples, double enough) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(samples.transpose() * samples);  // small: one row a sample
-  const Eigen::Index most = std::min(kMostTargets, samples.cols());
-  double left = std::max(0.0, solver.eigenvalues().sum());
-  Eigen::Index kept = 0;
-  while (kept < most && left > enough) left -= solver.eigenvalues()[samples.cols() - 1 - kept++];
-  Eigen::MatrixXd directions(samples.rows(), kept);
-  for (Eigen::Index k = 0; k < kept; ++k)
-    directions.col(k) = (samples * solver.eigenvectors().col(samples.cols() - 1 - k)).normalized();
-  return directions;
-}
-
 }  // namespace
 
-MovingNormals fit_normals(const std::vector<Appearance::Part>& parts, const Eigen::Matrix3Xd& rest_nodes,
-                          const retarget::Embedding& embedding, const retarget::Motion& motion,
-                          const std::vector<Eigen::Quaterniond>& turns) {
+MovingNormals fit_normals(const std::vector<Appearance::Part>& parts, const SkinCourse& skin,
+                          const std::vector<Eigen::Quaterniond>& turns, const std::vector<Eigen::Matrix3Xd>& shapes,
+                          const Eigen::MatrixXd& shape_weights) {
   MovingNormals result;
-  for (const Appearance::Part& part : parts) {
-    if (part.normals.cols() == 0) return result;
+  const Normals normals(parts, skin.bind_pose);
+  if (normals.count() == 0) return result;
+  Eigen::MatrixXd of_shapes(3 * normals.count(), static_cast<Eigen::Index>(shapes.size()));
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    of_shapes.col(static_cast<Eigen::Index>(k)) =
+        normals.offsets(skin.bind_pose + shapes[k], Eigen::Quaterniond::Identity());
+    result.of_shapes.push_back(normals.by_part(of_shapes.col(static_cast<Eigen::Index>(k))));
   }
-  const Normals normals(parts, skin_at(embedding, rest_nodes));
   const auto offsets_at = [&](Eigen::Index f) {
-    return normals.offsets(skin_at(embedding, motion.at(f)), turns[static_cast<std::size_t>(f)]);
+    Eigen::VectorXd offsets = normals.offsets(skin.at(f), turns[static_cast<std::size_t>(f)]);
+    if (!shapes.empty()) offsets -= of_shapes * shape_weights.col(f);
+    return offsets;
   };
-  const Eigen::Index frames = motion.count(), samples = std::min(frames, kSamples);
+  const Eigen::Index frames = skin.frames, samples = std::min(frames, kSamples);
   Eigen::MatrixXd sampled(3 * normals.count(), samples);
   for (Eigen::Index s = 0; s < samples; ++s) sampled.col(s) = offsets_at(samples > 1 ? s * (frames - 1) / (samples - 1) : 0);
   const double enough = kEnough * kEnough * static_cast<double>(samples * normals.count());
-  const Eigen::MatrixXd directions = principal_directions(sampled, enough);
+  const Eigen::MatrixXd directions = principal_directions(sampled, enough, kMostTargets);
   if (directions.cols() == 0) return result;
   result.weights.resize(directions.cols(), frames);
   for (Eigen::Index f = 0; f < frames; ++f) result.weights.col(f) = directions.transpose() * offsets_at(f);
   for (Eigen::Index k = 0; k < directions.cols(); ++k) {
     const double largest = std::max(result.weights.row(k).cwiseAbs().maxCoeff(), 1e-12);
     result.weights.row(k) /= largest;
-    std::vector<Eigen::Matrix3Xd>& target = result.targets.emplace_back();
-    for (const Eigen::VectorXi& mine : normals.of_parts()) {
-      Eigen::Matrix3Xd offsets(3, mine.size());
-      for (Eigen::Index d = 0; d < mine.size(); ++d) offsets.col(d) = largest * directions.col(k).segment<3>(3 * mine[d]);
-      target.push_back(std::move(offsets));
-    }
+    result.targets.push_back(normals.by_part(largest * directions.col(k)));
   }
   return result;
 }

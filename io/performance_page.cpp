@@ -130,6 +130,7 @@ void write_performance_page(const std::filesystem::path& path, const retarget::P
   const std::vector<Run> runs = runs_of(performances);
   PageInput page{report, performer.skin, performer.embedding, performer.mesh, {}, {}, {}, 0};
   page.appearance = &appearance;
+  page.morphs = &performer.morphs;
   page.motions.push_back({PageRole::kClip, true, performer.clip_skin});
   page.motions.push_back({PageRole::kTarget, false, performer.prepared.target});
   for (const Run& run : runs) page.motions.push_back({run.role, false, run.replay.motion});

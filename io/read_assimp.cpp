@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <unordered_map>
 
@@ -16,6 +17,7 @@
 #include "io/cut_polygons.h"
 #include "io/lost_curves.h"
 #include "io/read_scene.h"
+#include "io/scene_morphs.h"
 #include "io/track.h"
 #include "retarget/error.h"
 
@@ -80,6 +82,7 @@ class AssimpReader {
     for (auto& [name, node] : joint_names_) node = joint_node(name);
     for (unsigned a = 0; a < theirs_->mNumAnimations; ++a) read_clip(*theirs_->mAnimations[a]);
     for (const auto& [node, place] : meshes_on_) read_mesh(node, place);
+    forget_morphs_without_shape(scene_);
     read_all_materials();
     return std::move(scene_);
   }
@@ -241,11 +244,7 @@ class AssimpReader {
           read_channel(source, *place, ticks, "clip '" + clip.name + "', node '" + name + "'");
       if (pivot_of(name).empty()) whole.push_back(place->node);
     }
-    for (unsigned m = 0; m < theirs.mNumMorphMeshChannels; ++m) {
-      scene_.warnings.push_back("Clip '" + clip.name + "' moves the morph targets of '" +
-                                theirs.mMorphMeshChannels[m]->mName.C_Str() +
-                                "', which hold still as at rest; give that motion to bones before export.");
-    }
+    for (unsigned m = 0; m < theirs.mNumMorphMeshChannels; ++m) read_morphs(*theirs.mMorphMeshChannels[m], ticks, clip);
     for (const int node : whole) still_pivots(node, channels);
     for (auto& [place, channel] : channels) clip.channels.push_back(std::move(channel));
     if (scene_.format == "fbx") {
@@ -253,6 +252,70 @@ class AssimpReader {
         scene_.warnings.push_back(std::move(warning));
     }
     scene_.clips.push_back(std::move(clip));
+  }
+
+  /// Weights of morph targets, key by key of those that have one there. The channel is named after a node with meshes, in
+  /// FBX with the number of the geometry behind a star. At rest nothing is worn: assimp tells of no other weight.
+  void read_morphs(const aiMeshMorphAnim& theirs, double ticks, SceneClip& clip) {
+    const std::string name = theirs.mName.C_Str();
+    const aiNode* holder = holder_of_mesh(name);
+    if (holder == nullptr) holder = holder_of_mesh(name.substr(0, name.rfind('*')));
+    if (holder == nullptr) return;
+    unsigned targets = 0;
+    for (unsigned m = 0; m < holder->mNumMeshes; ++m)
+      targets = std::max(targets, theirs_->mMeshes[holder->mMeshes[m]]->mNumAnimMeshes);
+    std::map<unsigned, std::pair<std::vector<double>, std::vector<double>>> courses;
+    for (unsigned k = 0; k < theirs.mNumKeys; ++k) {
+      const aiMeshMorphKey& key = theirs.mKeys[k];
+      for (unsigned i = 0; i < key.mNumValuesAndWeights; ++i) {
+        if (key.mValues[i] >= targets) continue;
+        auto& [times, weights] = courses[key.mValues[i]];
+        times.push_back(key.mTime / ticks);
+        weights.push_back(key.mWeights[i]);
+      }
+    }
+    const std::string where = "clip '" + clip.name + "', node '" + holder->mName.C_Str() + "'";
+    for (auto& [target, course] : courses) {
+      auto& [times, weights] = course;
+      MorphChannel channel{place_of(holder), static_cast<int>(target), {}};
+      channel.weight.times = std::move(times);
+      channel.weight.values = Eigen::Map<const Eigen::RowVectorXd>(weights.data(), static_cast<Eigen::Index>(weights.size()));
+      make_sound(channel.weight, path_, where);
+      if (is_still(channel.weight, 0)) continue;
+      moving_morphs_.emplace(channel.node, channel.target);
+      clip.morphs.push_back(std::move(channel));
+    }
+  }
+
+  int place_of(const aiNode* holder) const {
+    return std::find_if(meshes_on_.begin(), meshes_on_.end(), [&](const auto& held) { return held.first == holder; })->second;
+  }
+
+  const aiNode* holder_of_mesh(const std::string& name) const {
+    for (const auto& [node, place] : meshes_on_) {
+      if (name == node->mName.C_Str()) return node;
+    }
+    return nullptr;
+  }
+
+  /// The shapes of the targets that some clip moves; assimp keeps a mesh as each makes it.
+  void read_shapes(const aiMesh& theirs, SceneMesh& ours) {
+    for (unsigned t = 0; t < theirs.mNumAnimMeshes; ++t) {
+      const aiAnimMesh& target = *theirs.mAnimMeshes[t];
+      SceneMesh::Morph& morph = ours.morphs.emplace_back();
+      morph.name = target.mName.length > 0 ? target.mName.C_Str() : "target_" + std::to_string(t);
+      const bool moves = moving_morphs_.contains({ours.node, static_cast<int>(t)});
+      if (!moves || target.mVertices == nullptr || target.mNumVertices != theirs.mNumVertices) continue;
+      Eigen::Matrix3Xd offsets(3, theirs.mNumVertices);
+      for (unsigned v = 0; v < theirs.mNumVertices; ++v)
+        offsets.col(v) = to_eigen(target.mVertices[v]) - to_eigen(theirs.mVertices[v]);
+      if (offsets.allFinite()) {
+        set_shape(offsets, morph);
+      } else {
+        scene_.warnings.push_back("Mesh '" + ours.name + "': morph target '" + morph.name +
+                                  "' holds still as at rest: an offset is not finite.");
+      }
+    }
   }
 
   /// A channel of the node's own name holds the whole local transform, pivots included: those above it must not count twice.
@@ -316,11 +379,13 @@ class AssimpReader {
       ours.node = place;
       read_surface(theirs, ours);
       if (ours.triangles.cols() == 0) continue;
+      read_shapes(theirs, ours);
       read_looks(theirs, static_cast<int>(theirs.mMaterialIndex), ours);
       for (unsigned b = 0; b < theirs.mNumBones; ++b) ours.joints.push_back(read_joint(*theirs.mBones[b], ours));
       // The offset matrices of 3ds Max files lack what moves the mesh alone. [5]
       const Eigen::Affine3d& geometry = geometry_[static_cast<std::size_t>(place)];
       ours.vertices = geometry * ours.vertices;
+      for (SceneMesh::Morph& morph : ours.morphs) morph.offsets = geometry.linear() * morph.offsets;
       if (std::abs(geometry.linear().determinant()) > 0)
         ours.normals = geometry.linear().inverse().transpose() * ours.normals;
       scene_.meshes.push_back(std::move(ours));
@@ -366,6 +431,7 @@ class AssimpReader {
   std::unordered_map<std::string, std::vector<Place>> places_;  // of each name
   std::map<std::string, int> joint_names_;                      // node of each bone
   std::vector<std::pair<const aiNode*, int>> meshes_on_;
+  std::set<std::pair<int, int>> moving_morphs_;  // scene node and target
   std::vector<Eigen::Affine3d> geometry_;  // of each scene node: what moves its own mesh alone
 };
 

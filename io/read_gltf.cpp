@@ -11,6 +11,7 @@
 
 #include "io/gltf_materials.h"
 #include "io/read_scene.h"
+#include "io/scene_morphs.h"
 #include "io/track.h"
 #include "retarget/error.h"
 
@@ -19,6 +20,7 @@ namespace {
 
 constexpr const char* kExportAnew = "Export the file anew";
 constexpr double kFarthestPlace = 1e6;          // in an image, in its widths
+constexpr std::size_t kMostMorphOffsets = 4'000'000;
 constexpr std::size_t kMostSparse = 5'000'000;  // elements of an accessor that no buffer bounds
 
 /// Keeps the bytes of an image that the text holds as data; others lie where they can be read at leisure.
@@ -94,8 +96,9 @@ class GltfReader {
     scene_.materials = read_materials(model_, scene_.warnings);
     scene_.images = read_images(model_, images_);
     read_nodes();
-    read_meshes();
     for (std::size_t a = 0; a < model_.animations.size(); ++a) read_clip(model_.animations[a], a);
+    read_meshes();
+    forget_morphs_without_shape(scene_);
     return std::move(scene_);
   }
 
@@ -259,8 +262,10 @@ class GltfReader {
     const auto positions = primitive.attributes.find("POSITION");
     if (positions == primitive.attributes.end()) return;
     ours.vertices = numbers(positions->second, 3, where);
-    add_morph_targets(primitive, node.weights.empty() ? mesh.weights : node.weights, where, ours.vertices);
+    ours.morphs = morphs(primitive, mesh, node);
+    add_morph_targets(primitive, where, ours);
     if (!ours.vertices.allFinite()) refuse(where, "a vertex is not finite");
+    read_moving_morphs(primitive, where, ours);
     ours.triangles = triangles(primitive, ours.vertices.cols(), where);
     if (ours.triangles.cols() == 0) return;  // points or lines
     read_looks(primitive, where, ours);
@@ -300,15 +305,55 @@ class GltfReader {
     ours.colours.topRows(told.rows()) = told.cwiseMax(0).cwiseMin(1);
   }
 
+  static double weight_at_rest(const tinygltf::Mesh& mesh, const tinygltf::Node& node, std::size_t target) {
+    const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
+    return target < weights.size() ? weights[target] : 0;
+  }
+
+  /// Names and weights at rest. Names are where most exporters put them.
+  std::vector<SceneMesh::Morph> morphs(const tinygltf::Primitive& primitive, const tinygltf::Mesh& mesh,
+                                       const tinygltf::Node& node) const {
+    std::vector<SceneMesh::Morph> ours(primitive.targets.size());
+    const tinygltf::Value names = mesh.extras.IsObject() ? mesh.extras.Get("targetNames") : tinygltf::Value();
+    for (std::size_t t = 0; t < ours.size(); ++t) {
+      const bool is_named = names.IsArray() && t < names.ArrayLen() && names.Get(static_cast<int>(t)).IsString();
+      ours[t].name = is_named ? names.Get(static_cast<int>(t)).Get<std::string>() : "target_" + std::to_string(t);
+      ours[t].weight = weight_at_rest(mesh, node, t);
+    }
+    return ours;
+  }
+
   /// Moves the vertices by the morph targets as the mesh wears them at rest.
-  void add_morph_targets(const tinygltf::Primitive& primitive, const std::vector<double>& weights, const std::string& where,
-                         Eigen::Matrix3Xd& vertices) const {
-    for (std::size_t t = 0; t < primitive.targets.size() && t < weights.size(); ++t) {
+  void add_morph_targets(const tinygltf::Primitive& primitive, const std::string& where, SceneMesh& ours) const {
+    for (std::size_t t = 0; t < primitive.targets.size(); ++t) {
       const auto positions = primitive.targets[t].find("POSITION");
-      if (positions == primitive.targets[t].end() || weights[t] == 0) continue;
+      if (positions == primitive.targets[t].end() || ours.morphs[t].weight == 0) continue;
       const Eigen::MatrixXd offsets = numbers(positions->second, 3, where);
-      if (offsets.cols() != vertices.cols()) refuse(where, "a morph target has not as many vertices as the mesh");
-      vertices += weights[t] * offsets;
+      if (offsets.cols() != ours.vertices.cols()) refuse(where, "a morph target has not as many vertices as the mesh");
+      ours.vertices += ours.morphs[t].weight * offsets;
+    }
+  }
+
+  /// The shapes of those targets that some clip moves.
+  void read_moving_morphs(const tinygltf::Primitive& primitive, const std::string& where, SceneMesh& ours) {
+    for (std::size_t t = 0; t < ours.morphs.size(); ++t) {
+      const auto positions = primitive.targets[t].find("POSITION");
+      if (positions == primitive.targets[t].end() || !moving_morphs_.contains({ours.node, static_cast<int>(t)})) continue;
+      SceneMesh::Morph& morph = ours.morphs[t];
+      // A character whose face is broken is still one.
+      try {
+        const Eigen::MatrixXd offsets = numbers(positions->second, 3, where);
+        if (offsets.cols() != ours.vertices.cols()) refuse(where, "it has not as many vertices as the mesh");
+        if (!offsets.allFinite()) refuse(where, "an offset is not finite");
+        set_shape(offsets, morph);
+        morph_offsets_ += static_cast<std::size_t>(morph.vertices.size());
+        if (morph_offsets_ <= kMostMorphOffsets) continue;
+        set_shape({}, morph);
+        refuse(where, "the file's targets move more than " + std::to_string(kMostMorphOffsets) + " vertices");
+      } catch (const Error& error) {
+        scene_.warnings.push_back(upper_first(where) + ": morph target '" + morph.name + "' holds still as at rest: " +
+                                  error.what() + ".");
+      }
     }
   }
 
@@ -393,8 +438,8 @@ class GltfReader {
       if (channel.target_node < 0) continue;
       const std::size_t node = place(channel.target_node, where);
       const bool turns = channel.target_path == "rotation";
-      if (channel.target_path == "weights" && has_moving_targets(channel.target_node))
-        warn_of_morphs(where, scene_.nodes[node].name);
+      if (channel.target_path == "weights")
+        read_morph_channels(at(animation.samplers, channel.sampler, where), channel.target_node, where, clip);
       if (!turns && channel.target_path != "translation" && channel.target_path != "scale") continue;
       Track& track = turns                            ? by_node[node].rotation
                      : channel.target_path == "scale" ? by_node[node].scale
@@ -412,42 +457,61 @@ class GltfReader {
     scene_.clips.push_back(std::move(clip));
   }
 
-  /// Targets may move normals alone.
-  bool has_moving_targets(int node) const {
-    const int mesh = model_.nodes[static_cast<std::size_t>(node)].mesh;
-    if (mesh < 0 || static_cast<std::size_t>(mesh) >= model_.meshes.size()) return false;
-    for (const tinygltf::Primitive& primitive : model_.meshes[static_cast<std::size_t>(mesh)].primitives) {
-      for (const auto& target : primitive.targets) {
-        const auto positions = target.find("POSITION");
-        if (positions == target.end()) continue;
-        const tinygltf::Accessor& offsets = at(model_.accessors, positions->second, "mesh");
-        const auto is_zero = [](double value) { return value == 0; };
-        const bool told_still = offsets.minValues.size() == 3 && offsets.maxValues.size() == 3;
-        if (!told_still || !std::all_of(offsets.minValues.begin(), offsets.minValues.end(), is_zero) ||
-            !std::all_of(offsets.maxValues.begin(), offsets.maxValues.end(), is_zero)) {
-          return true;
-        }
+  /// A sampler of weights tells of all targets of a node's mesh in turn, key by key. Those that it leaves as at rest are
+  /// no channels.
+  void read_morph_channels(const tinygltf::AnimationSampler& sampler, int node, const std::string& clip_place,
+                           SceneClip& clip) {
+    const tinygltf::Node& theirs = model_.nodes[static_cast<std::size_t>(node)];
+    if (theirs.mesh < 0) return;
+    const std::string where = clip_place + ", node '" + scene_.nodes[place(node, clip_place)].name + "'";
+    const tinygltf::Mesh& mesh = at(model_.meshes, theirs.mesh, where);
+    const std::size_t targets = mesh.primitives.empty() ? 0 : mesh.primitives.front().targets.size();
+    if (targets == 0) return;
+    try {
+      const Track all = read_keys(sampler, 1, static_cast<Eigen::Index>(targets), where);
+      for (std::size_t t = 0; t < targets; ++t) {
+        MorphChannel channel{static_cast<int>(place(node, where)), static_cast<int>(t), row_of(all, static_cast<Eigen::Index>(t))};
+        make_sound(channel.weight, path_, where);
+        clip.duration_s = std::max(clip.duration_s, channel.weight.times.back());
+        if (is_still(channel.weight, weight_at_rest(mesh, theirs, t))) continue;
+        moving_morphs_.emplace(channel.node, channel.target);
+        std::erase_if(clip.morphs, [&](const MorphChannel& other) {
+          return other.node == channel.node && other.target == channel.target;
+        });
+        clip.morphs.push_back(std::move(channel));
       }
+    } catch (const Error& error) {
+      scene_.warnings.push_back(upper_first(where) + ": its morph targets hold still as at rest: " + error.what() + ".");
     }
-    return false;
   }
 
-  void warn_of_morphs(const std::string& clip, const std::string& node) {
-    scene_.warnings.push_back(upper_first(clip) + " moves the morph targets of '" + node +
-                              "', which hold still as at rest; give that motion to bones before export.");
+  static Track row_of(const Track& all, Eigen::Index row) {
+    const auto part = [&](const Eigen::MatrixXd& values) -> Eigen::MatrixXd {
+      return values.size() > 0 ? Eigen::MatrixXd(values.row(row)) : values;
+    };
+    return {all.interpolation, all.times, part(all.values), part(all.in_tangents), part(all.out_tangents)};
   }
 
   Track read_track(const tinygltf::AnimationSampler& sampler, Eigen::Index rows, const std::string& where) const {
+    Track track = read_keys(sampler, rows, 1, where);
+    make_sound(track, path_, where);
+    return track;
+  }
+
+  /// Keys as they are, each of `elements` elements of `components` numbers.
+  Track read_keys(const tinygltf::AnimationSampler& sampler, Eigen::Index components, Eigen::Index elements,
+                  const std::string& where) const {
     Track track;
     if (sampler.interpolation == "STEP") track.interpolation = Interpolation::kStep;
     if (sampler.interpolation == "CUBICSPLINE") track.interpolation = Interpolation::kCubic;
     const bool cubic = track.interpolation == Interpolation::kCubic;
     const Eigen::MatrixXd times = numbers(sampler.input, 1, where);
-    const Eigen::MatrixXd output = numbers(sampler.output, rows, where, rows == 4);
+    Eigen::MatrixXd output = numbers(sampler.output, components, where, components != 3);
     const Eigen::Index keys = times.cols();
-    if (output.cols() != keys * (cubic ? 3 : 1)) {
+    if (output.cols() != keys * elements * (cubic ? 3 : 1)) {
       refuse(where, "it has " + std::to_string(output.cols()) + " values for " + std::to_string(keys) + " key times");
     }
+    output.resize(components * elements, output.cols() / elements);
     track.times.assign(times.data(), times.data() + keys);
     track.values = output;
     if (cubic) {  // in-tangent, value, out-tangent of each key in turn
@@ -455,7 +519,6 @@ class GltfReader {
       track.values = output(Eigen::all, Eigen::seqN(1, keys, 3));
       track.out_tangents = output(Eigen::all, Eigen::seqN(2, keys, 3));
     }
-    make_sound(track, path_, where);
     return track;
   }
 
@@ -464,6 +527,8 @@ class GltfReader {
   const tinygltf::Model model_;
   Scene scene_;
   std::vector<int> scene_node_;  // of each node of the file
+  std::set<std::pair<int, int>> moving_morphs_;  // scene node and target
+  std::size_t morph_offsets_ = 0;
 };
 
 }  // namespace

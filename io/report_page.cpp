@@ -193,6 +193,20 @@ Json looks_json(const Appearance& appearance) {
   return json;
 }
 
+Json morphs_json(const retarget::MovingMorphs& morphs) {
+  Json json{{"targets", Json::array()},
+            {"weights", packed_as<float>(morphs.weights)},
+            {"frames", morphs.weights.cols()},
+            {"rate_hz", morphs.rate_hz},
+            {"loop", morphs.loop}};
+  for (const retarget::MorphTarget& target : morphs.targets) {
+    json["targets"].push_back({{"name", target.name},
+                               {"vertices", packed_as<std::uint32_t>(target.vertices)},
+                               {"offsets", packed_as<float>(target.offsets)}});
+  }
+  return json;
+}
+
 Json page_json(const PageInput& input) {
   Json json;
   json["report"] = Json::parse(report_json(input.report));
@@ -205,6 +219,7 @@ Json page_json(const PageInput& input) {
                   {"nodes", packed_as<std::uint32_t>(input.embedding.nodes)},
                   {"weights", packed_as<float>(input.embedding.weights)}};
   if (input.appearance != nullptr && !input.appearance->parts.empty()) json["looks"] = looks_json(*input.appearance);
+  if (input.morphs != nullptr && !input.morphs->targets.empty()) json["morphs"] = morphs_json(*input.morphs);
   json["body"] = {{"nodes", packed_as<float>(input.body.nodes)}, {"edges", packed_as<std::uint32_t>(input.body.edges)}};
   json["motions"] = Json::array();
   for (const PageMotion& motion : input.motions) {

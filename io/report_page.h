@@ -9,6 +9,7 @@
 #include "retarget/clip.h"
 #include "retarget/contacts.h"
 #include "retarget/control_mesh.h"
+#include "retarget/morphs.h"
 #include "retarget/motion.h"
 #include "retarget/run_report.h"
 
@@ -69,6 +70,7 @@ struct PageInput {
   std::vector<PageObstacle> obstacles = {};
   std::string accuracy_svg = {};           // error against time of what was tried, where an accuracy was asked for
   const Appearance* appearance = nullptr;  // what the replay wears; null, or without parts: one colour
+  const retarget::MovingMorphs* morphs = nullptr;  // worn by whatever the nodes move; null, or without targets: nothing
 };
 
 /// Writes one HTML file that needs nothing else, no network either: the view of the motions, the charts, the contact

@@ -9,6 +9,7 @@
 
 #include "io/rig_skin.h"
 #include "io/scene_pose.h"
+#include "io/track.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -346,6 +347,18 @@ std::vector<Eigen::Affine3d> bone_poses(const Rig& rig, const Scene& scene, cons
   std::vector<Eigen::Affine3d> poses;
   for (const int node : rig.scene_nodes) poses.push_back(rig.to_ours * nodes[static_cast<std::size_t>(node)]);
   return poses;
+}
+
+Eigen::VectorXd morph_weights(const Rig& rig, const SceneClip& clip, double time_s) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rig.morph_sources.size()));
+  std::map<std::pair<int, int>, const Track*> tracks;
+  for (const MorphChannel& channel : clip.morphs) tracks[{channel.node, channel.target}] = &channel.weight;
+  for (Eigen::Index k = 0; k < weights.size(); ++k) {
+    const Rig::MorphSource& source = rig.morph_sources[static_cast<std::size_t>(k)];
+    const auto track = tracks.find({source.node, source.target});
+    if (track != tracks.end()) weights[k] = value_at(*track->second, time_s)[0] - source.at_rest;
+  }
+  return weights;
 }
 
 }  // namespace hydrostat::io

@@ -26,6 +26,12 @@ struct Rig {
   std::vector<RigMesh> meshes;   // that the skin was made of
   Eigen::Matrix3Xi corners;      // 3 x T; of each of the skin's triangles the meshes' vertices that were its corners
   Eigen::VectorXi triangle_materials;  // T; of the scene's, -1 is none
+  /// Where the weight of one of the skin's morphs is told.
+  struct MorphSource {
+    int node, target;  // as a MorphChannel has them
+    double at_rest;
+  };
+  std::vector<MorphSource> morph_sources;  // K
   std::vector<std::string> warnings;
 };
 
@@ -39,5 +45,8 @@ Rig build_rig(const Scene& scene, const std::string& path);
 
 /// The bones at a time of the clip, bone space (as in the file) to metres, y up: one per bone of the rig.
 std::vector<Eigen::Affine3d> bone_poses(const Rig& rig, const Scene& scene, const SceneClip& clip, double time_s);
+
+/// The weights of the skin's morphs at a time of the clip, over those at rest: K.
+Eigen::VectorXd morph_weights(const Rig& rig, const SceneClip& clip, double time_s);
 
 }  // namespace hydrostat::io

@@ -56,14 +56,61 @@ bool weights_agree(const std::vector<retarget::SkinnedMesh::Influence>& a,
          });
 }
 
-/// Makes one vertex of those that share place and weights (seams of texture and normals), and drops triangles that
-/// collapse.
+/// How the morph targets move each vertex: which of them, and its offset [m].
+class MorphsOfVertices {
+ public:
+  explicit MorphsOfVertices(const retarget::SkinnedMesh& skin) {
+    if (skin.morphs.empty()) return;
+    moves_.resize(static_cast<std::size_t>(skin.vertices.cols()));
+    for (std::size_t k = 0; k < skin.morphs.size(); ++k) {
+      const retarget::MorphTarget& morph = skin.morphs[k];
+      for (Eigen::Index i = 0; i < morph.vertices.size(); ++i)
+        moves_[static_cast<std::size_t>(morph.vertices[i])].push_back({k, morph.offsets.col(i)});
+    }
+  }
+
+  bool agree(int a, int b, double tolerance) const {
+    if (moves_.empty()) return true;
+    const std::vector<Move>&x = moves_[static_cast<std::size_t>(a)], &y = moves_[static_cast<std::size_t>(b)];
+    return x.size() == y.size() && std::equal(x.begin(), x.end(), y.begin(), [&](const Move& p, const Move& q) {
+             return p.morph == q.morph && (p.offset - q.offset).cwiseAbs().maxCoeff() <= tolerance;
+           });
+  }
+
+ private:
+  struct Move {
+    std::size_t morph;
+    Eigen::Vector3d offset;
+  };
+  std::vector<std::vector<Move>> moves_;
+};
+
+/// Names the vertices of the morph targets anew, each once.
+void renumber_morphs(const std::vector<int>& now, std::vector<retarget::MorphTarget>& morphs) {
+  for (retarget::MorphTarget& morph : morphs) {
+    std::map<int, Eigen::Index> kept;
+    for (Eigen::Index i = 0; i < morph.vertices.size(); ++i)
+      kept.try_emplace(now[static_cast<std::size_t>(morph.vertices[i])], i);
+    const auto count = static_cast<Eigen::Index>(kept.size());
+    retarget::MorphTarget renumbered{morph.name, Eigen::VectorXi(count), Eigen::Matrix3Xd(3, count)};
+    Eigen::Index place = 0;
+    for (const auto& [vertex, from] : kept) {
+      renumbered.vertices[place] = vertex;
+      renumbered.offsets.col(place++) = morph.offsets.col(from);
+    }
+    morph = std::move(renumbered);
+  }
+}
+
+/// Makes one vertex of those that share place, weights and morphs (seams of texture and normals, but not the lips of a
+/// closed mouth), and drops triangles that collapse.
 void weld(Rig& rig) {
   retarget::SkinnedMesh& skin = rig.skin;
   const double grid = kWeldGrid * std::max(extent_of(skin.vertices), 1e-12);
   using Place = std::array<long long, 3>;
   std::map<Place, std::vector<int>> welded_at;
-  std::vector<int> now(static_cast<std::size_t>(skin.vertices.cols()));
+  std::vector<int> now(static_cast<std::size_t>(skin.vertices.cols())), first_of;
+  const MorphsOfVertices morphs(skin);
   retarget::SkinnedMesh welded;
   welded.vertices.resize(3, skin.vertices.cols());
   for (Eigen::Index v = 0; v < skin.vertices.cols(); ++v) {
@@ -74,12 +121,14 @@ void weld(Rig& rig) {
     // Where a hostile file heaps up vertices of all weights, the first few are compared.
     const auto end = here.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(here.size(), kMostCompared));
     const auto same = std::find_if(here.begin(), end, [&](int other) {
-      return weights_agree(weights, welded.skin_weights[static_cast<std::size_t>(other)]);
+      return weights_agree(weights, welded.skin_weights[static_cast<std::size_t>(other)]) &&
+             morphs.agree(static_cast<int>(v), first_of[static_cast<std::size_t>(other)], grid);
     });
     if (same == end) {
       here.push_back(static_cast<int>(welded.skin_weights.size()));
       welded.vertices.col(here.back()) = skin.vertices.col(v);
       welded.skin_weights.push_back(weights);
+      first_of.push_back(static_cast<int>(v));
       now[static_cast<std::size_t>(v)] = here.back();
     } else {
       now[static_cast<std::size_t>(v)] = *same;
@@ -100,6 +149,8 @@ void weld(Rig& rig) {
   welded.triangles.conservativeResize(Eigen::NoChange, kept);
   rig.corners.conservativeResize(Eigen::NoChange, kept);
   rig.triangle_materials.conservativeResize(kept);
+  welded.morphs = std::move(skin.morphs);
+  renumber_morphs(now, welded.morphs);
   skin = std::move(welded);
 }
 
@@ -145,6 +196,31 @@ void add_looks(const SceneMesh& mesh, const Eigen::Matrix3d& linear, int first_v
   if (mesh.triangle_materials.size() == materials.size()) materials = mesh.triangle_materials;
 }
 
+/// The morph of the skin that takes what a mesh tells of one; a name that is there already gets a number.
+retarget::MorphTarget& morph_of(const Rig::MorphSource& source, const std::string& name, Rig& rig) {
+  std::vector<retarget::MorphTarget>& morphs = rig.skin.morphs;
+  for (std::size_t k = 0; k < morphs.size(); ++k) {
+    if (rig.morph_sources[k].node == source.node && rig.morph_sources[k].target == source.target) return morphs[k];
+  }
+  const bool is_taken = std::any_of(morphs.begin(), morphs.end(), [&](const auto& morph) { return morph.name == name; });
+  rig.morph_sources.push_back(source);
+  const std::string number = is_taken ? "#" + std::to_string(rig.morph_sources.size()) : "";
+  return morphs.emplace_back(retarget::MorphTarget{name + number, {}, {}});
+}
+
+void add_morphs(const SceneMesh& mesh, const Eigen::Matrix3d& linear, int first_vertex, Rig& rig) {
+  for (std::size_t t = 0; t < mesh.morphs.size(); ++t) {
+    const SceneMesh::Morph& told = mesh.morphs[t];
+    if (told.vertices.size() == 0) continue;
+    retarget::MorphTarget& morph = morph_of({mesh.node, static_cast<int>(t), told.weight}, told.name, rig);
+    const Eigen::Index before = morph.vertices.size(), more = told.vertices.size();
+    morph.vertices.conservativeResize(before + more);
+    morph.vertices.tail(more) = told.vertices.array() + first_vertex;
+    morph.offsets.conservativeResize(Eigen::NoChange, before + more);
+    morph.offsets.rightCols(more) = rig.to_ours.linear() * linear * told.offsets;
+  }
+}
+
 }  // namespace
 
 double extent_of(const Eigen::Matrix3Xd& points) {
@@ -161,6 +237,7 @@ void add_mesh(const SceneMesh& mesh, const Eigen::Affine3d& into_bind, const std
   if (into_bind.linear().determinant() < 0) {
     skin.triangles.rightCols(mesh.triangles.cols()).row(1).swap(skin.triangles.rightCols(mesh.triangles.cols()).row(2));
   }
+  add_morphs(mesh, into_bind.linear(), static_cast<int>(first), rig);
   add_looks(mesh, into_bind.linear(), static_cast<int>(first), first_triangle, rig);
   std::vector<std::map<int, double>> sums(static_cast<std::size_t>(mesh.vertices.cols()));
   for (std::size_t j = 0; j < mesh.joints.size(); ++j) {

@@ -17,7 +17,7 @@ enum class Interpolation : std::uint8_t { kStep, kLinear, kCubic };
 struct Track {
   Interpolation interpolation = Interpolation::kLinear;
   std::vector<double> times;                  // [s] K, ascending; 0 is the clip's start as the file counts
-  Eigen::MatrixXd values;                     // 3 x K or 4 x K
+  Eigen::MatrixXd values;                     // 3 x K or 4 x K; of a weight 1 x K
   Eigen::MatrixXd in_tangents, out_tangents;  // [1/s] as values, for kCubic alone
 };
 
@@ -27,10 +27,17 @@ struct Channel {
   Track translation, rotation, scale;
 };
 
+/// The weight [-] of one morph target over time, of all meshes on one scene node.
+struct MorphChannel {
+  int node = 0, target = 0;
+  Track weight;  // 1 x K
+};
+
 struct SceneClip {
   std::string name;
   double duration_s = 0;  // from 0 to the last key (FBX: LocalStart to LocalStop)
   std::vector<Channel> channels;
+  std::vector<MorphChannel> morphs = {};  // of targets that move
 };
 
 /// What of a parent's scale reaches a scene node. With R the rotation, S the scale and shear, p of the parent, l local:
@@ -59,6 +66,13 @@ struct SceneMesh {
     Eigen::Affine3d inverse_bind_matrix;  // mesh space to bone space
     std::vector<Weight> weights;          // as the file has them
   };
+  /// A shape beside that of the vertices.
+  struct Morph {
+    std::string name;
+    double weight = 0;          // at rest: so much of it is in the vertices
+    Eigen::VectorXi vertices;   // M, each once; none: no clip moves it, and its shape is not told
+    Eigen::Matrix3Xd offsets;   // [file units] 3 x M, mesh space
+  };
   std::string name;
   int node = 0;
   Eigen::Matrix3Xd vertices;   // [file units] 3 x V, mesh space
@@ -68,6 +82,7 @@ struct SceneMesh {
   Eigen::Matrix3Xd normals;            // 3 x V, of length 1, mesh space; none: not told
   std::vector<Eigen::Matrix2Xd> uvs;   // of each set 2 x V, v downward
   Eigen::Matrix4Xd colours;            // 4 x V, linear, 0..1; none: not told
+  std::vector<Morph> morphs;           // a channel names them by their place here
   bool is_wanted = false;      // named by the user: comes along even where nothing carries it
 };
 

@@ -9,7 +9,7 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x334e4353'4f524459;  // begins an answer; another for each form of it
+constexpr std::uint64_t kMagic = 0x344e4353'4f524459;  // begins an answer; another for each form of it
 constexpr std::uint64_t kEnd = 0x2e646e65'2e646e65;    // ends it
 constexpr double kLargestNumber = 1e12;
 constexpr std::size_t kMostNodes = 10000, kMostClips = 2000;  // what follows takes time that grows faster than they do
@@ -137,10 +137,24 @@ void pass(Wire& wire, Channel& channel) {
   pass(wire, channel.scale);
 }
 template <typename Wire>
+void pass(Wire& wire, MorphChannel& channel) {
+  pass(wire, channel.node);
+  pass(wire, channel.target);
+  pass(wire, channel.weight);
+}
+template <typename Wire>
+void pass(Wire& wire, SceneMesh::Morph& morph) {
+  pass(wire, morph.name);
+  pass(wire, morph.weight);
+  pass(wire, morph.vertices);
+  pass(wire, morph.offsets);
+}
+template <typename Wire>
 void pass(Wire& wire, SceneClip& clip) {
   pass(wire, clip.name);
   pass(wire, clip.duration_s);
   pass(wire, clip.channels);
+  pass(wire, clip.morphs);
 }
 template <typename Wire>
 void pass(Wire& wire, SceneNode& node) {
@@ -168,6 +182,7 @@ void pass(Wire& wire, SceneMesh& mesh) {
   pass(wire, mesh.normals);
   pass(wire, mesh.uvs);
   pass(wire, mesh.colours);
+  pass(wire, mesh.morphs);
 }
 template <typename Wire>
 void pass(Wire& wire, Image& image) {
@@ -241,6 +256,18 @@ void check_looks(const SceneMesh& mesh, std::size_t materials) {
   for (const Eigen::Matrix2Xd& places : mesh.uvs) require(fits(places.cols()), "a mesh's places in images do not fit its vertices");
 }
 
+/// Each vertex once, in order, so that nobody need look for repetitions.
+void check_morphs(const SceneMesh& mesh) {
+  for (const SceneMesh::Morph& morph : mesh.morphs) {
+    require(morph.vertices.size() == morph.offsets.cols(), "a morph target has not as many offsets as vertices");
+    for (Eigen::Index i = 0; i < morph.vertices.size(); ++i) {
+      require(is_index(morph.vertices[i], static_cast<std::size_t>(mesh.vertices.cols())) &&
+                  (i == 0 || morph.vertices[i] > morph.vertices[i - 1]),
+              "a morph target moves a vertex that is not there");
+    }
+  }
+}
+
 void check_material(const Material& material, std::size_t images) {
   const auto is_share = [](double value) { return value >= 0 && value <= 1; };
   require(is_share(material.metallic) && is_share(material.roughness) && material.alpha_cutoff >= 0 &&
@@ -270,6 +297,7 @@ void check(const Scene& scene) {
       require(is_index(mesh.triangles.data()[i], vertices), "a triangle names a vertex that is not there");
     }
     check_looks(mesh, scene.materials.size());
+    check_morphs(mesh);
     for (const SceneMesh::Joint& joint : mesh.joints) {
       require(is_index(joint.node, scene.nodes.size()), "a skin names a node that is not there");
       for (const SceneMesh::Weight& weight : joint.weights) {
@@ -286,6 +314,11 @@ void check(const Scene& scene) {
       check_track(channel.translation, 3);
       check_track(channel.rotation, 4);
       check_track(channel.scale, 3);
+    }
+    for (const MorphChannel& channel : clip.morphs) {
+      require(is_index(channel.node, scene.nodes.size()) && channel.target >= 0 && !channel.weight.times.empty(),
+              "a channel moves no morph target");
+      check_track(channel.weight, 1);
     }
   }
 }

@@ -13,6 +13,8 @@ constexpr const char* kTargetTitle = "hydrostat.target";
 constexpr const char* kTargetVersion = "2";
 constexpr const char* kAppearanceTitle = "hydrostat.appearance";
 constexpr const char* kAppearanceVersion = "1";
+constexpr const char* kMorphsTitle = "hydrostat.morphs";
+constexpr const char* kMorphsVersion = "1";
 
 /// Skin weights one after the other.
 struct Influences {
@@ -53,16 +55,26 @@ void name_fields(RecordArchive& archive, retarget::Skeleton& skeleton) {
                  skeleton.weighted);
 }
 
+void name_fields(RecordArchive& archive, retarget::MorphTarget& morph) {
+  archive.fields("name", morph.name, "vertices", morph.vertices, "offsets", morph.offsets);
+}
+
+void name_fields(RecordArchive& archive, retarget::MovingMorphs& morphs) {
+  archive.list("targets", "target", morphs.targets);
+  archive.fields("weights", morphs.weights, "rate_hz", morphs.rate_hz, "loop", morphs.loop);
+}
+
 void name_fields(RecordArchive& archive, retarget::SkinnedMesh& skin) {
   Influences row = in_a_row(skin);
   archive.fields("vertices", skin.vertices, "triangles", skin.triangles);
   archive.fields("influence_places", row.places, "influence_weights", row.weights);
+  archive.list("morphs", "morph", skin.morphs);
   if (archive.is_loading()) hand_out(row, skin);
 }
 
 void name_fields(RecordArchive& archive, retarget::Clip& clip) {
   archive.fields("name", clip.name, "index", clip.index, "duration_s", clip.duration_s, "range_s", clip.range_s,
-                 "key_rate_hz", clip.key_rate_hz, "rate_hz", clip.rate_hz);
+                 "key_rate_hz", clip.key_rate_hz, "rate_hz", clip.rate_hz, "morph_weights", clip.morph_weights);
   archive.list("frames", "frame", clip.bone_pose);
 }
 
@@ -143,8 +155,8 @@ void name_fields(RecordArchive& archive, retarget::CouplingReport& report) {
 }
 
 void name_fields(RecordArchive& archive, retarget::ImportedMotion& imported) {
-  archive.fields("nodes", imported.nodes, "skin_points", imported.skin_points, "skin", imported.skin, "coupling",
-                 imported.coupling, "root_motion", imported.root_motion, "warnings", imported.warnings);
+  archive.fields("nodes", imported.nodes, "skin_points", imported.skin_points, "skin", imported.skin, "morphs",
+                 imported.morphs, "coupling", imported.coupling, "root_motion", imported.root_motion, "warnings", imported.warnings);
 }
 
 void name_fields(RecordArchive& archive, retarget::Patch& patch) {
@@ -284,6 +296,7 @@ HYDROSTAT_RECORD(retarget::InverseDynamics)
 HYDROSTAT_RECORD(retarget::Performances)
 HYDROSTAT_RECORD(PerformedTarget)
 HYDROSTAT_RECORD(Appearance)
+HYDROSTAT_RECORD(retarget::MovingMorphs)
 #undef HYDROSTAT_RECORD
 
 std::string target_bytes(const PerformedTarget& target) { return packed(record_of(target), kTargetTitle, kTargetVersion); }
@@ -340,6 +353,28 @@ Appearance parse_appearance(const std::string& bytes, const std::string& file, E
     for (const Appearance::Part& part : appearance.parts) sound = sound && fits(part, appearance, vertices);
     for (const Material& material : appearance.materials) sound = sound && fits(material, appearance);
     if (sound) return appearance;
+  } catch (const std::out_of_range&) {
+    throw damaged;
+  }
+  throw Error(file, "", "does not belong to body.json", "Make the creature again with 'hydrostat convert'.");
+}
+
+std::string morphs_bytes(const retarget::MovingMorphs& morphs) {
+  return packed(record_of(morphs), kMorphsTitle, kMorphsVersion);
+}
+
+retarget::MovingMorphs parse_morphs(const std::string& bytes, const std::string& file, Eigen::Index vertices) {
+  const Error damaged(file, "", "is damaged or of another version", "Make the creature again with 'hydrostat convert'.");
+  const std::optional<Record> record = unpacked(bytes, kMorphsTitle, kMorphsVersion);
+  if (!record) throw damaged;
+  try {
+    retarget::MovingMorphs morphs = result_of<retarget::MovingMorphs>(*record);
+    bool sound = morphs.rate_hz > 0 && morphs.weights.cols() > 0 && morphs.weights.allFinite() &&
+                 morphs.weights.rows() == static_cast<Eigen::Index>(morphs.targets.size());
+    for (const retarget::MorphTarget& morph : morphs.targets)
+      sound = sound && are_in(morph.vertices, vertices) && morph.offsets.cols() == morph.vertices.size() &&
+              morph.offsets.allFinite();
+    if (sound) return morphs;
   } catch (const std::out_of_range&) {
     throw damaged;
   }

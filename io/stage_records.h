@@ -39,4 +39,9 @@ std::string appearance_bytes(const Appearance& appearance);
 /// `vertices`: of the skin. Throws Error for bytes that are damaged, of another version or about another skin.
 Appearance parse_appearance(const std::string& bytes, const std::string& file, Eigen::Index vertices);
 
+/// morphs.bin: the morph targets that a creature wears, "hydrostat.morphs/1".
+std::string morphs_bytes(const retarget::MovingMorphs& morphs);
+/// `vertices`: of the skin. Throws Error for bytes that are damaged, of another version or about another skin.
+retarget::MovingMorphs parse_morphs(const std::string& bytes, const std::string& file, Eigen::Index vertices);
+
 }  // namespace hydrostat::io

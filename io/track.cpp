@@ -45,7 +45,7 @@ Eigen::VectorXd between(const Track& track, Eigen::Index k, double fraction, dou
     return (2 * s3 - 3 * s2 + 1) * from + span_s * (s3 - 2 * s2 + s) * track.out_tangents.col(k) + (3 * s2 - 2 * s3) * to +
            span_s * (s3 - s2) * track.in_tangents.col(k + 1);
   }
-  if (from.size() == 3) return from + fraction * (to - from);
+  if (from.size() != 4) return from + fraction * (to - from);
   const Eigen::Quaterniond a(from[3], from[0], from[1], from[2]), b(to[3], to[0], to[1], to[2]);
   return a.slerp(fraction, b).coeffs();
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "retarget/error.h"
+#include "retarget/morphs.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -115,19 +116,20 @@ class FrameSolver {
     solver_options_.logging_type = ceres::SILENT;
   }
 
-  /// Node positions [m] for bones that moved by `motion` since the bind pose. False where the iterations did not suffice.
-  bool solve(const std::vector<Eigen::Affine3d>& motion) {
+  /// Node positions [m] for bones that moved by `motion` since the bind pose, in which the nodes lie at `bind_pose` [m].
+  /// False where the iterations did not suffice.
+  bool solve(const std::vector<Eigen::Affine3d>& motion, const Eigen::Matrix3Xd& bind_pose) {
     positions_.setZero();
     for (std::size_t h = 0; h < anchors_.size(); ++h) {
       const auto& [node, bone, weight] = rig_.holds[h];
       const Eigen::Affine3d& move = motion[static_cast<std::size_t>(bone)];
       const Eigen::Matrix<double, 3, 4> ways = move.linear() * rig_.directions;
-      const Eigen::Vector3d hub = move * mesh_.nodes.col(node);
+      const Eigen::Vector3d hub = move * bind_pose.col(node);
       anchors_[h].anchors = ways.colwise() + hub;
       anchors_[h].lengths = ways.colwise().norm();
       positions_.col(node) += weight * hub;
     }
-    set_edge_lengths(motion);
+    set_edge_lengths(motion, bind_pose);
     ceres::Solver::Summary summary;
     ceres::Solve(solver_options_, &problem_, &summary);
     return summary.termination_type == ceres::CONVERGENCE;
@@ -143,11 +145,11 @@ class FrameSolver {
   }
 
   /// The length that an edge's bones give it, the mean over the owners of both ends.
-  void set_edge_lengths(const std::vector<Eigen::Affine3d>& motion) {
+  void set_edge_lengths(const std::vector<Eigen::Affine3d>& motion, const Eigen::Matrix3Xd& bind_pose) {
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       const int a = mesh_.edges(0, static_cast<Eigen::Index>(e));
       const int b = mesh_.edges(1, static_cast<Eigen::Index>(e));
-      const Eigen::Vector3d way = mesh_.nodes.col(b) - mesh_.nodes.col(a);
+      const Eigen::Vector3d way = bind_pose.col(b) - bind_pose.col(a);
       double length = 0;
       for (int bone = 0; bone < mesh_.bone_weights.rows(); ++bone) {
         const double weight = 0.5 * (mesh_.bone_weights(bone, a) + mesh_.bone_weights(bone, b));
@@ -166,6 +168,32 @@ class FrameSolver {
   ceres::Solver::Options solver_options_;
 };
 
+/// What the morph targets make of the bind pose's nodes, frame by frame.
+class MorphedNodes {
+ public:
+  MorphedNodes(const Character& character, const ControlMesh& mesh, const Embedding& skin_embedding, double least)
+      : nodes_(mesh.nodes), weights_(character.clip.morph_weights) {
+    if (weights_.size() == 0) return;
+    carried = carried_by_nodes(character.skin.morphs, mesh, skin_embedding);
+    double most = 0;
+    for (Eigen::Index f = 0; f < weights_.cols(); ++f)
+      most = std::max(most, (at(f) - nodes_).colwise().squaredNorm().maxCoeff());
+    if (std::sqrt(most) < least) carried.clear();
+  }
+
+  Eigen::Matrix3Xd at(Eigen::Index frame) const {
+    Eigen::Matrix3Xd nodes = nodes_;
+    for (std::size_t k = 0; k < carried.size(); ++k) nodes += weights_(static_cast<Eigen::Index>(k), frame) * carried[k];
+    return nodes;
+  }
+
+  std::vector<Eigen::Matrix3Xd> carried;
+
+ private:
+  const Eigen::Matrix3Xd& nodes_;
+  const Eigen::MatrixXd& weights_;
+};
+
 struct FrameError {
   double squared_sum = 0;  // [m²]
   double max = 0;          // [m]
@@ -178,6 +206,7 @@ std::string broken_rule(const CouplingOptions& options) {
   if (!(options.anchor_distance > 0)) return "anchor_distance must be above 0";
   if (!(options.elasticity >= 0)) return "elasticity must be 0 or above";
   if (!(options.least_weight >= 0 && options.least_weight < 1)) return "least_weight must be from 0 to below 1";
+  if (!(options.least_morph >= 0)) return "least_morph must be 0 or above";
   if (options.max_iterations < 1) return "max_iterations must be 1 or more";
   if (options.threads < 1) return "threads must be 1 or more";
   return "";
@@ -194,18 +223,23 @@ CoupledMotion couple(const Character& character, const ControlMesh& mesh, const 
   std::vector<Eigen::Affine3d> to_bone(static_cast<std::size_t>(skeleton.count()));
   for (std::size_t b = 0; b < to_bone.size(); ++b) to_bone[b] = skeleton.bind_pose[b].inverse();
   const Rig rig = hang_on_bones(mesh, options);
+  const double length = (skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff()).maxCoeff();
+  MorphedNodes nodes(character, mesh, skin_embedding, options.least_morph * length);
   std::vector<FrameError> errors(static_cast<std::size_t>(clip.frames()));
   auto solve_every = [&](int first, int step) {
     FrameSolver solver(mesh, rig, options);
+    SkinnedMesh carried = skin;  // with what the nodes carry of the morph targets: the error is the body's
     for (int f = first; f < clip.frames(); f += step) {
       const std::vector<Eigen::Affine3d>& pose = clip.bone_pose[static_cast<std::size_t>(f)];
       std::vector<Eigen::Affine3d> motion(to_bone.size());
       for (std::size_t b = 0; b < motion.size(); ++b) motion[b] = pose[b] * to_bone[b];
       FrameError& error = errors[static_cast<std::size_t>(f)];
-      error.converged = solver.solve(motion);
+      const Eigen::Matrix3Xd bind_pose = nodes.at(f);
+      error.converged = solver.solve(motion, bind_pose);
+      if (!nodes.carried.empty()) carried.vertices = skin.vertices + embedded_positions(skin_embedding, bind_pose - mesh.nodes);
       coupled.motion.at(f) = solver.positions();
       const Eigen::VectorXd squared =
-          (embedded_positions(skin_embedding, solver.positions()) - skin_positions(skeleton, skin, pose))
+          (embedded_positions(skin_embedding, solver.positions()) - skin_positions(skeleton, carried, pose))
               .colwise()
               .squaredNorm();
       error.squared_sum = squared.sum();
@@ -217,8 +251,8 @@ CoupledMotion couple(const Character& character, const ControlMesh& mesh, const 
   for (int t = 1; t < threads; ++t) crew.emplace_back(solve_every, t, threads);
   solve_every(0, threads);
   for (std::thread& member : crew) member.join();
+  coupled.node_morphs = std::move(nodes.carried);
 
-  const double length = (skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff()).maxCoeff();
   double squared_sum = 0;
   for (int f = 0; f < clip.frames(); ++f) {
     const FrameError& error = errors[static_cast<std::size_t>(f)];

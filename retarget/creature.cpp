@@ -27,6 +27,7 @@ void scale_character(Character& character, double scale) {
     return result;
   };
   character.skin.vertices *= scale;
+  for (MorphTarget& morph : character.skin.morphs) morph.offsets *= scale;
   for (Eigen::Affine3d& pose : character.skeleton.bind_pose) pose = scaled(pose);
   for (auto& frame : character.clip.bone_pose) {
     for (Eigen::Affine3d& pose : frame) pose = scaled(pose);
@@ -75,9 +76,7 @@ double bring_to_origin(Character& character) {
 /// The skin's vertices with the moves that made the clip a loop with its travel on the ground. `loop` is the clip as
 /// close_loop leaves it.
 Motion skin_motion(const Character& character, const Motion& loop, const RootMotionResult& root, double ground) {
-  const auto vertices_at = [&](Eigen::Index f) {
-    return skin_positions(character.skeleton, character.skin, character.clip.bone_pose[static_cast<std::size_t>(f)]);
-  };
+  const auto vertices_at = [&](Eigen::Index f) { return skin_positions(character, f); };
   const Eigen::Index frames = loop.count();
   const Eigen::Index stride = loop.rate_hz > 1.5 * kSkinRate && (!loop.loop || frames % 2 == 0) ? 2 : 1;
   Motion skin;
@@ -166,7 +165,7 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   Motion both = coupled.motion;
   both.frames.conservativeResize(3 * (nodes + points), Eigen::NoChange);
   for (Eigen::Index f = 0; f < frames; ++f) {
-    const Eigen::Matrix3Xd skin = skin_positions(character.skeleton, character.skin, character.clip.bone_pose[static_cast<std::size_t>(f)]);
+    const Eigen::Matrix3Xd skin = skin_positions(character, f);
     for (Eigen::Index p = 0; p < points; ++p) both.frames.col(f).segment<3>(3 * (nodes + p)) = skin.col(creature.contacts.vertices[p]);
   }
   Eigen::VectorXd mass = Eigen::VectorXd::Zero(nodes + points);
@@ -194,6 +193,8 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   result.skin_points = both;
   result.skin_points.frames = both.frames.bottomRows(3 * points);
   result.skin = skin_motion(character, loop, root, ground);
+  result.morphs = {left_by_nodes(character.skin.morphs, coupled.node_morphs, creature.skin),
+                   closed_weights(character.clip.morph_weights, loop), loop.rate_hz, loop.loop};
   return result;
 }
 

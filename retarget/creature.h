@@ -9,6 +9,7 @@
 #include "retarget/control_mesh.h"
 #include "retarget/coupling.h"
 #include "retarget/inverse_dynamics.h"
+#include "retarget/morphs.h"
 #include "retarget/muscles.h"
 #include "retarget/prepare.h"
 #include "retarget/replay.h"
@@ -59,6 +60,7 @@ struct ImportedMotion {
   Motion nodes;                // 3N x F
   Motion skin_points;          // the contact points' vertices as the clip has them, 3P x F
   Motion skin;                 // all of its vertices likewise, at 30 Hz where the frames allow, 3V x F
+  MovingMorphs morphs;         // what the body leaves of the clip's
   CouplingReport coupling;
   std::string root_motion;     // "clip", "from feet" or "none"
   std::vector<std::string> warnings;

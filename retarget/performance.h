@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "retarget/control_mesh.h"
+#include "retarget/morphs.h"
 #include "retarget/replay.h"
 #include "retarget/signal_set.h"
 
@@ -19,6 +20,7 @@ struct Performer {
   PreparedTarget prepared;
   Motion clip_points;      // the contact points as the clip has them, 3P x F
   Motion clip_skin;        // all of the skin likewise, thinned for the eye, 3V x F
+  MovingMorphs morphs;     // that the skin wears over what the body carries
   double clip_rise = 0;    // [m] of the centre of mass of the clip's nodes, over its height at the start
   double length = 1, size = 1;  // L and D [m]
   std::string self_contact_reason = "nobody asked for it";  // why the scene has it or not

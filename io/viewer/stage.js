@@ -8,6 +8,7 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 import { centre, floats, indices, kRoles } from './data.js';
 import { Looks } from './looks.js';
+import { Morphs } from './morphs.js';
 
 /** The skin that control nodes carry: vertex v is the weighted sum of its four nodes. */
 function embed(nodes, skin, out) {
@@ -97,6 +98,7 @@ export class Stage {
     this.told_looks = page.looks;
     this.edges = indices(page.body.edges);
     this.rest = floats(page.body.nodes);
+    if (page.morphs) this.morphs = new Morphs(page.morphs, this.skin, this.rest);
     this.length = page.report.body.length_m || 1;
     this.ground_normal = new Vector3(...page.ground_normal);
     this.ground_height = page.ground_height;
@@ -279,8 +281,12 @@ export class Stage {
   move_skin(body, t) {
     const attribute = body.mesh.geometry.getAttribute('position');
     const positions = body.motion.at(t);
-    if (body.motion.of_skin) attribute.array.set(positions);
-    else embed(positions, this.skin, attribute.array);
+    if (body.motion.of_skin) {
+      attribute.array.set(positions);
+    } else {
+      embed(positions, this.skin, attribute.array);
+      this.morphs?.put_on(t, positions, (body.turns ??= new Map()), attribute.array);
+    }
     if (body.looks) return body.looks.move(attribute.array);
     attribute.needsUpdate = true;
     body.mesh.geometry.computeVertexNormals();

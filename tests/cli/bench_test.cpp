@@ -36,6 +36,28 @@ TEST(Bench, ScalingTellsTheCostOfEverySizeInTableAndPage) {
   EXPECT_TRUE(fs::exists(directory.path / "out" / "scene.toml"));  // what '-' stands for
 }
 
+TEST(Bench, SpeedTellsWhatEveryStageOfAConversionCosts) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = hydrostat_in(
+      directory.path, "bench speed '" HYDROSTAT_SAMPLES "/worm_crawl.glb' -o out --nodes 40 --duration 0.2 --json --quiet");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["schema"], "hydrostat.speed/1");
+  for (const char* key : {"small_read_ms", "read_ms", "import_ms"}) EXPECT_GT(json[key], 0) << key;
+  EXPECT_LE(json["small_read_ms"], 2 * json["read_ms"].get<double>());
+  ASSERT_EQ(json["rows"].size(), 1U);
+  for (const char* key : {"nodes", "constraints", "body_ms", "coupling_ms_per_frame", "preparation_ms_per_frame",
+                          "inverse_ms_per_frame", "signals_ms", "simulation_ms_per_s", "counted_ms_per_s", "real_time"})
+    EXPECT_GT(json["rows"][0][key], 0) << key;
+  EXPECT_EQ(json["rows"][0]["frames"], 120);
+  const std::string csv = io::read_file(directory.path / "out" / "speed.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 2);
+  EXPECT_FALSE(fs::exists(directory.path / "out" / "small.bvh"));
+  EXPECT_EQ(hydrostat_in(directory.path, "bench speed missing.fbx -o out --quiet").exit_code, 1);
+  EXPECT_EQ(hydrostat_in(directory.path, "bench speed missing.fbx -o out --nodes 7").exit_code, 2);
+}
+
 TEST(Bench, ScalingRefusesWhatItCannotRead) {
   const TemporaryDirectory directory;
   EXPECT_EQ(hydrostat_in(directory.path, "bench scaling missing.toml -o out --quiet").exit_code, 1);

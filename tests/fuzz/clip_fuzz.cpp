@@ -71,6 +71,15 @@ int check_character(const std::string& path) {
     return unsound("a triangle names a vertex that is not there");
   }
   try {
+    const std::string worn = io::morphs_bytes({character.skin.morphs, character.clip.morph_weights});
+    if (!character.skin.morphs.empty()) io::parse_morphs(worn, path, character.skin.vertices.cols());
+  } catch (const Error&) {
+    return unsound("its morph targets do not fit its skin");
+  }
+  for (int f = 0; f < character.clip.frames() && !character.skin.morphs.empty(); ++f) {
+    if (!retarget::skin_positions(character, f).allFinite()) return unsound("a morphed vertex is not finite");
+  }
+  try {
     io::parse_appearance(io::appearance_bytes(looks), path, character.skin.vertices.cols());
   } catch (const Error&) {
     return unsound("its looks do not fit its skin");

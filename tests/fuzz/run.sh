@@ -35,7 +35,7 @@ files_of() {
     manifest) echo "$corpus/manifest.toml" ;;
     scene) ls "$project"/samples/scenes/*.toml ;;
     cut) ls "$project/samples/worm_crawl.glb" "$assets"/{fbx/max_transformed_skin_zup.fbx,collada/cylinder_animated_from_3ds_max.dae} 2> /dev/null || true ;;
-    *) find "$project/samples" "$assets" -name "*.$1" -size "-$largest" -not -path '*/broken/*' 2> /dev/null | sort || true ;;
+    *) find "$corpus" "$project/samples" "$assets" -name "*.$1" -size "-$largest" -not -path '*/broken/*' 2> /dev/null | sort || true ;;
   esac
 }
 

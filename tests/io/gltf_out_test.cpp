@@ -98,18 +98,25 @@ std::vector<Number> values(const tinygltf::Model& model, int index) {
 /// way.
 Eigen::Matrix3Xd play(const tinygltf::Model& model, std::size_t key, double share = 0) {
   const tinygltf::Primitive& primitive = model.meshes[0].primitives[0];
-  const std::vector<float> positions = values<float>(model, primitive.attributes.at("POSITION"));
+  std::vector<float> positions = values<float>(model, primitive.attributes.at("POSITION"));
   const std::vector<unsigned short> joints = values<unsigned short>(model, primitive.attributes.at("JOINTS_0"));
   const std::vector<float> weights = values<float>(model, primitive.attributes.at("WEIGHTS_0"));
   const std::vector<float> inverse_binds = values<float>(model, model.skins[0].inverseBindMatrices);
   std::vector<Eigen::Affine3d> pose(model.skins[0].joints.size());
   const tinygltf::Animation& animation = model.animations.at(0);
   for (const tinygltf::AnimationChannel& channel : animation.channels) {
-    if (channel.target_path == "weights") continue;  // of normals
     const std::vector<float> keys =
         values<float>(model, animation.samplers[static_cast<std::size_t>(channel.sampler)].output);
     const auto joint = static_cast<std::size_t>(channel.target_node - model.skins[0].joints[0]);
     const std::size_t next = share > 0 ? key + 1 : key;
+    if (channel.target_path == "weights") {
+      for (std::size_t k = 0, targets = primitive.targets.size(); k < targets; ++k) {
+        const auto weight = static_cast<float>((1 - share) * keys[targets * key + k] + share * keys[targets * next + k]);
+        const std::vector<float> offsets = values<float>(model, primitive.targets[k].at("POSITION"));
+        for (std::size_t i = 0; i < offsets.size(); ++i) positions[i] += weight * offsets[i];
+      }
+      continue;
+    }
     if (channel.target_path == "translation") {
       const Eigen::Vector3d here = Eigen::Map<const Eigen::Vector3f>(&keys[3 * key]).cast<double>();
       const Eigen::Vector3d there = Eigen::Map<const Eigen::Vector3f>(&keys[3 * next]).cast<double>();
@@ -268,9 +275,103 @@ TEST(WriteSkinnedGlb, NormalsBendWithTheBody) {
   EXPECT_GT(normal_error(model, creature, 4, false), 0.3) << "the turn of the whole would do: the test tests nothing";
 }
 
+TEST(WriteSkinnedGlb, NormalsBendBesideAPartThatIsFlat) {
+  const Creature creature = bar({0, 0.5, 1, 1.5, 2, 1, -0.5, -1.5});
+  Appearance looks;
+  looks.parts.resize(2);
+  for (std::size_t p = 0; p < 2; ++p) {
+    Appearance::Part& part = looks.parts[p];
+    part.vertices = Eigen::VectorXi::LinSpaced(creature.vertices.cols(), 0, static_cast<int>(creature.vertices.cols()) - 1);
+    part.triangles = p == 0 ? creature.triangles : creature.triangles.leftCols(8);
+  }
+  looks.parts[0].normals = surface_normals(creature.vertices, creature.triangles);
+  const auto write_to = [&](const fs::path& path) {
+    write_skinned_glb(path, {creature.vertices, creature.triangles, creature.embedding, &looks}, creature.body, creature.mass,
+                      creature.motion, {});
+  };
+  write_to(scratch("half_flat"));
+  const tinygltf::Model model = load(scratch("half_flat"));
+  for (Eigen::Index f = 0; f < creature.motion.count(); ++f) EXPECT_LT(normal_error(model, creature, f, true), 0.07);
+  const auto& primitives = model.meshes[0].primitives;
+  ASSERT_EQ(primitives[0].targets.size(), primitives[1].targets.size()) << "as glTF wants";
+  EXPECT_FALSE(primitives[1].targets[0].contains("NORMAL"));
+}
+
 TEST(WriteSkinnedGlb, NormalsOfARigidBodyNeedNoHelp) {
   write(scratch("rigid"), bar({0, 0, 0}));
   EXPECT_TRUE(load(scratch("rigid")).meshes[0].primitives[0].targets.empty());
+}
+
+/// The bar with edges, and a face: its last section swells by a centimetre or two, away from the bar.
+struct Face {
+  Creature creature;
+  retarget::MovingMorphs morphs;
+
+  explicit Face(const std::vector<double>& bends) : creature(bar(bends)) {
+    std::vector<int> edges;
+    const auto count = static_cast<int>(creature.vertices.cols());
+    for (int a = 0; a < count; ++a) {
+      for (int b = a + 1; b < count && b / 4 <= a / 4 + 1; ++b) edges.insert(edges.end(), {a, b});
+    }
+    creature.body.edges =
+        Eigen::Map<const Eigen::Matrix2Xi>(edges.data(), 2, static_cast<Eigen::Index>(edges.size() / 2));
+    const Eigen::VectorXi last = Eigen::VectorXi::LinSpaced(4, count - 4, count - 1);
+    morphs.targets = {{"pout", last, Eigen::Vector3d(0.02, 0, 0).replicate(1, 4)},
+                      {"brow", last.head(2), Eigen::Vector3d(0, 0.01, 0.01).replicate(1, 2)}};
+    const auto frames = static_cast<Eigen::Index>(bends.size());
+    morphs.rate_hz = creature.motion.rate_hz;
+    morphs.weights.resize(2, frames);
+    for (Eigen::Index f = 0; f < frames; ++f) morphs.weights.col(f) << 0.3 + 0.1 * static_cast<double>(f % 5), f % 2;
+  }
+
+  void write_to(const fs::path& path) const {
+    write_skinned_glb(path, {creature.vertices, creature.triangles, creature.embedding, nullptr, &morphs}, creature.body,
+                      creature.mass, creature.motion, {});
+  }
+};
+
+TEST(WriteSkinnedGlb, MorphTargetsAreWornByNameAndTurnWithTheBodyAroundThem) {
+  const std::vector<double> bends{0, 0.5, 1, 1.5, 2, 1, -0.5, -1.5};
+  const Face face(bends);
+  face.write_to(scratch("face"));
+  const tinygltf::Model model = load(scratch("face"));
+  const tinygltf::Value names = model.meshes[0].extras.Get("targetNames");
+  ASSERT_EQ(names.ArrayLen(), model.meshes[0].primitives[0].targets.size());
+  EXPECT_EQ(names.Get(0).Get<std::string>(), "pout");
+  EXPECT_EQ(names.Get(1).Get<std::string>(), "brow");
+  double common_error = 0;
+  for (Eigen::Index f = 0; f < face.creature.motion.count(); ++f) {
+    const Eigen::Matrix3Xd bare = face.creature.motion.at(f);
+    const Eigen::Matrix3d whole =
+        Eigen::AngleAxisd(0.3 * static_cast<double>(f), Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const double at_end = 0.5 * bends[static_cast<std::size_t>(f)];
+    const Eigen::Matrix3d own = whole * Eigen::AngleAxisd(-at_end, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const Eigen::Matrix3Xd offset =
+        retarget::morphed(Eigen::Matrix3Xd::Zero(3, bare.cols()), face.morphs.targets, face.morphs.weights.col(f));
+    const Eigen::Matrix3Xd error = play(model, static_cast<std::size_t>(f)) - bare - own * offset;
+    // The neighbours turn less than the end itself, by a sixteenth of the bend.
+    const double largest = offset.colwise().norm().maxCoeff();
+    EXPECT_LT(error.colwise().norm().maxCoeff(), (0.03 + std::abs(at_end) / 7) * largest) << "frame " << f;
+    common_error = std::max(common_error, ((whole - own) * offset).colwise().norm().maxCoeff() / largest);
+  }
+  EXPECT_GT(common_error, 0.8) << "the turn of the whole would do: the test tests nothing";
+  const Scene scene = read_gltf(scratch("face"));
+  ASSERT_GE(scene.clips.at(0).morphs.size(), 2u);
+  EXPECT_EQ(scene.meshes[0].morphs[0].name, "pout");
+  EXPECT_NEAR(scene.clips[0].morphs[0].weight.values(0, 2), 0.5, 1e-6);
+}
+
+TEST(WriteSkinnedGlb, MorphTargetsOfALoopKeepItsPhaseForEver) {
+  Face face({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  face.morphs.loop = true;
+  face.morphs.weights.conservativeResize(Eigen::NoChange, 5);  // 5 frames a period, 13 of the motion
+  face.write_to(scratch("phase"));
+  const tinygltf::Model model = load(scratch("phase"));
+  const Eigen::Index corner = face.creature.vertices.cols() - 1;
+  for (std::size_t f = 0; f < 13; ++f) {
+    const double away = (play(model, f) - face.creature.motion.at(static_cast<Eigen::Index>(f))).col(corner).norm();
+    EXPECT_NEAR(away, 0.02 * (0.3 + 0.1 * static_cast<double>(f % 5)), 1e-6) << "frame " << f;
+  }
 }
 
 TEST(WriteSkinnedGlb, ALoopEndsWhereItsNextPeriodBegins) {
@@ -311,8 +412,10 @@ TEST(WriteSkinnedGlb, KhronosValidatorFindsNothing) {
   creature.motion.loop = true;
   write(scratch("valid"), creature);
   write(scratch("valid_bent"), bar({0, 1, 2}));
+  Face({0, 1, 2}).write_to(scratch("valid_face"));
   const std::string command = "NODE_PATH='" HYDROSTAT_NODE_MODULES "' node '" HYDROSTAT_TESTS "/io/validate_glb.cjs' '" +
-                              scratch("valid").string() + "' '" + scratch("valid_bent").string() + "'";
+                              scratch("valid").string() + "' '" + scratch("valid_bent").string() + "' '" +
+                              scratch("valid_face").string() + "'";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 

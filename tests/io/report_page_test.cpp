@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -263,6 +264,21 @@ TEST(ReportPage, AFallStandsInItsData) {
   const Json report = data_of(write_and_read(bar.page(), "page_fall")).at("report");
   EXPECT_EQ(report["replay"]["closed_loop"]["fell"], true);
   EXPECT_EQ(report["outcome_ok"], false);
+}
+
+TEST(ReportPage, HoldsTheMorphTargetsAndPlaysThemTurnedWithTheBody) {
+  const WobblingBar bar;
+  retarget::MovingMorphs morphs{{{"smile", Eigen::Vector2i(3, 5), Eigen::Matrix3Xd::Ones(3, 2)}}, {}, 30, true};
+  morphs.weights = Eigen::RowVector3d(0, 0.5, 1);
+  PageInput page = bar.page();
+  page.morphs = &morphs;
+  const Json told = data_of(write_and_read(page, "morphs")).at("morphs");
+  EXPECT_EQ(told["targets"][0]["name"], "smile");
+  EXPECT_EQ(told["frames"], 3);
+  EXPECT_EQ(told["rate_hz"], 30);
+  EXPECT_EQ(told["loop"], true);
+  EXPECT_FALSE(data_of(write_and_read(bar.page(), "morphs")).contains("morphs"));
+  EXPECT_EQ(std::system("node '" HYDROSTAT_TESTS "/io/check_morphs.mjs'"), 0);
 }
 
 TEST(ReportPage, RefusesAPlaceThatCannotBeWritten) {

@@ -25,11 +25,13 @@ Scene small_scene() {
   mesh.triangles.resize(3, 1);
   mesh.triangles << 0, 1, 2;
   mesh.joints = {{1, Eigen::Affine3d::Identity(), {{0, 1.0}, {2, 0.5}}}};
+  mesh.morphs = {{"smile", 0.25, Eigen::Vector2i(0, 2), Eigen::Matrix3Xd::Ones(3, 2)}, {"frown", 0, {}, {}}};
   scene.meshes = {mesh};
   Channel channel;
   channel.node = 1;
   channel.rotation = {Interpolation::kLinear, {0, 1}, Eigen::MatrixXd::Constant(4, 2, 0.5), {}, {}};
   scene.clips = {{"nod", 1.0, {channel}}};
+  scene.clips[0].morphs = {{1, 0, {Interpolation::kLinear, {0, 1}, Eigen::MatrixXd::Constant(1, 2, 0.5), {}, {}}}};
   scene.warnings = {"none"};
   return scene;
 }
@@ -40,6 +42,8 @@ TEST(SceneWire, WhatIsWrittenIsReadBack) {
   ASSERT_TRUE(std::holds_alternative<Scene>(answer));
   EXPECT_EQ(std::get<Scene>(answer).nodes[1].name, "bone");
   EXPECT_EQ(std::get<Scene>(answer).meshes[0].joints[0].weights[1].weight, 0.5);
+  EXPECT_EQ(std::get<Scene>(answer).meshes[0].morphs[0].name, "smile");
+  EXPECT_EQ(std::get<Scene>(answer).clips[0].morphs[0].weight.values(0, 1), 0.5);
   EXPECT_EQ(to_bytes(answer), bytes);
 }
 
@@ -92,6 +96,12 @@ TEST(SceneWire, IndicesThatPointNowhereAreRefused) {
   refuses([](Scene& scene) { scene.clips[0].channels[0].part = 1; });
   refuses([](Scene& scene) { scene.clips[0].channels[0].rotation.times = {1, 0}; });
   refuses([](Scene& scene) { scene.clips[0].channels[0].rotation.values.resize(3, 2); });
+  refuses([](Scene& scene) { scene.meshes[0].morphs[0].vertices[1] = 3; });
+  refuses([](Scene& scene) { scene.meshes[0].morphs[0].vertices[1] = 0; });
+  refuses([](Scene& scene) { scene.meshes[0].morphs[0].offsets.resize(3, 1); });
+  refuses([](Scene& scene) { scene.clips[0].morphs[0].node = 2; });
+  refuses([](Scene& scene) { scene.clips[0].morphs[0].weight.times.clear(); });
+  refuses([](Scene& scene) { scene.clips[0].morphs[0].weight.values.resize(2, 2); });
   refuses([](Scene& scene) { scene.meshes[0].vertices(0, 0) = std::numeric_limits<double>::quiet_NaN(); });
 }
 

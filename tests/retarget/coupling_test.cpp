@@ -6,6 +6,7 @@
 #include <random>
 
 #include "retarget/error.h"
+#include "retarget/morphs.h"
 #include "shapes.h"
 
 namespace hydrostat::retarget {
@@ -112,6 +113,69 @@ TEST(Coupling, IsTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(alone.motion.frames, together.motion.frames);
     EXPECT_EQ(alone.error_rms_length, together.error_rms_length);
   }
+}
+
+/// The worm with one morph target that swells its middle third by `size` [m]; no weight in the first frame, all in the second.
+Character swelling_worm(double size) {
+  Character character = worm();
+  character.clip = clip_of({character.skeleton.bind_pose, character.skeleton.bind_pose});
+  const auto& vertices = character.skin.vertices;
+  const Eigen::Vector3d middle = 0.5 * (vertices.rowwise().minCoeff() + vertices.rowwise().maxCoeff());
+  std::vector<int> moved;
+  for (int v = 0; v < vertices.cols(); ++v) {
+    if (std::abs(vertices(2, v) - middle.z()) < 0.1) moved.push_back(v);
+  }
+  MorphTarget swell{"swell", Eigen::Map<const Eigen::VectorXi>(moved.data(), static_cast<Eigen::Index>(moved.size())), {}};
+  swell.offsets = vertices(Eigen::all, moved).colwise() - middle;
+  swell.offsets.row(2).setZero();
+  swell.offsets = size * swell.offsets.colwise().normalized();
+  character.skin.morphs = {swell};
+  character.clip.morph_weights = Eigen::RowVector2d(0, 1);
+  return character;
+}
+
+TEST(Coupling, LargeMorphTargetsMoveTheBodySmallOnesAreLeftToBeWornAndNothingIsLost) {
+  Character character = swelling_worm(0.03);
+  const Setting body = body_of(character);
+  const CoupledMotion coupled = couple(character, body.mesh, body.skin_embedding);
+  ASSERT_EQ(coupled.node_morphs.size(), 1u);
+  EXPECT_LT((coupled.motion.at(0) - body.mesh.nodes).cwiseAbs().maxCoeff(), 1e-9);
+  const Eigen::Matrix3Xd whole = skin_positions(character, 1);
+  const Eigen::Matrix3Xd of_body = embedded_positions(body.skin_embedding, coupled.motion.at(1));
+  EXPECT_GT((of_body - character.skin.vertices).norm(), 0.5 * (whole - character.skin.vertices).norm());
+  const std::vector<MorphTarget> left = left_by_nodes(character.skin.morphs, coupled.node_morphs, body.skin_embedding);
+  const Eigen::Matrix3Xd both = morphed(of_body, left, Eigen::VectorXd::Ones(1));
+  // The embedding misses the skin by as much in the bind pose.
+  const Eigen::Matrix3Xd miss = embedded_positions(body.skin_embedding, body.mesh.nodes) - character.skin.vertices;
+  EXPECT_LT((both - miss - whole).cwiseAbs().maxCoeff(), 1e-4);
+
+  character = swelling_worm(0.004);
+  const CoupledMotion small = couple(character, body.mesh, body.skin_embedding);
+  EXPECT_TRUE(small.node_morphs.empty());
+  EXPECT_EQ(small.motion.at(1), small.motion.at(0));
+  EXPECT_LT(small.error_max_length, 0.004) << "what is worn over the body is no error of it";
+  EXPECT_EQ(left_by_nodes(character.skin.morphs, small.node_morphs, body.skin_embedding)[0].offsets,
+            character.skin.morphs[0].offsets);
+}
+
+TEST(MovingMorphs, ALoopKeepsItsPhaseAndClosesAndAOneShotHoldsItsLast) {
+  Motion motion;
+  motion.loop = true;
+  motion.frames.setZero(3, 10);
+  const Eigen::MatrixXd told = Eigen::RowVectorXd::LinSpaced(11, 0, 1);
+  MovingMorphs morphs{{}, closed_weights(told, motion), 10, true};
+  ASSERT_EQ(morphs.weights.cols(), 10);
+  EXPECT_NEAR(morphs.at(0)[0], 0.5, 1e-12) << "half of what its end misses its start by";
+  EXPECT_NEAR(morphs.at(0.5)[0], told(0, 5), 1e-12);
+  for (const double t : {0.0, 0.13, 0.5, 0.97}) {
+    for (const int cycle : {1, 7}) EXPECT_NEAR(morphs.at(t + cycle)[0], morphs.at(t)[0], 1e-9);
+  }
+  EXPECT_NEAR(morphs.at(1 - 1e-9)[0], morphs.at(0)[0], 1e-6);
+  motion.loop = false;
+  morphs = {{}, closed_weights(told, motion), 10, false};
+  EXPECT_EQ(morphs.weights, told);
+  EXPECT_NEAR(morphs.at(0.55)[0], 0.55, 1e-12);
+  EXPECT_EQ(morphs.at(7)[0], 1);
 }
 
 TEST(Coupling, LegsMoveApart) {

@@ -19,10 +19,12 @@ constexpr int kSlow = 12;         // a step of more iterations makes the next on
 // smaller and smaller parts.
 constexpr int kFreeUpdates = 3;
 constexpr double kShorterUpdate = 0.7;
-// A node's residual force is told as the velocity that it would give the node in a step, over the body's size [1/s].
-constexpr double kResidual = 1e-5;      // small enough: a turning body loses angular momentum by it
-constexpr double kInnerDecrease = 0.3;  // of the residual [-] between two updates of the friction limits
-constexpr double kGivenUp = 1e-2;       // after the last iterate: no solution was found
+// A node's residual force is told as the velocity that it would give the node in a step, in sqrt(g D): what a body of 1 mm and
+// one of 100 m have in common.
+constexpr double kResidual = 2e-6;      // [-] small enough: a turning body loses angular momentum by it
+constexpr double kInnerDecrease = 0.3;  // of the residual [-] between two updates of what the potential takes as given
+constexpr double kGivenUp = 2e-3;       // [-] after the last iterate: no solution was found
+constexpr double kGravity = 9.81;       // [m/s^2] of these units, where the scene has none, too
 constexpr double kLongestSubstep = 1.0 / 12;  // of sqrt(D / g) [-], 1/60 s at D = 0.4 m: the midpoint rule lets energy swing by more
 constexpr double kArmijo = 1e-4;
 constexpr int kHalvings = 20;
@@ -50,6 +52,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
         matrix_(scene.body),
         contact_(scene),
         size_(size_of_volume<Dim>(scene.body.rest_volume.sum())),
+        speed_(std::sqrt(kGravity * size_)),
         inverse_mass_(inverse_masses(scene.body)),
         ones_(Eigen::VectorXd::Ones(scene.body.edge_count())),
         foreseen_(scene.body.rest),
@@ -62,7 +65,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
         start_{scene.body.rest, scene.body.rest},
         whole_start_(start_),
         part_(make_impulses(scene)),
-        longest_substep_(kLongestSubstep * std::sqrt(size_ / 9.81)) {
+        longest_substep_(kLongestSubstep * std::sqrt(size_ / kGravity)) {
     dashpots_.mass = scene.body.mass;
     dashpots_.edges = scene.body.edges;
     dashpots_.rest_length = scene.body.rest_length;
@@ -125,7 +128,10 @@ class ImplicitStepper final : public StepperOf<Dim> {
       if (effect_force != nullptr) foreseen_.col(i) += (0.5 * dt * dt / body.mass[i]) * effect_force->col(i);
     }
     for (const int node : body.held) foreseen_.col(node) = state.x.col(node);
-    if (forces_.has_dashpots()) lay_dashpots(dt);
+    if (forces_.has_dashpots()) {
+      middle_ = start_.x + 0.5 * dt * start_.v;
+      lay_dashpots();
+    }
     if (contact_.is_needed()) {
       contact_.begin(start_, foreseen_, dt, reach());
       contact_.update_friction(state.x);
@@ -143,16 +149,25 @@ class ImplicitStepper final : public StepperOf<Dim> {
   }
 
   /// A dashpot pulls at c n_m . (s1 - s0) / h = (2 c / h) (l_m - n_m . s0), s the span and n_m its direction in the middle: a
-  /// spring, when n_m . s0 is taken at the middle that the velocities foresee.
-  void lay_dashpots(double dt) {
+  /// spring whose rest length is n_m . s0. With the n_m that the solver finds it only ever takes energy, for the pull's work
+  /// is -c (|s1|^2 - |s0|^2)^2 / (4 h l_m^2).
+  void lay_dashpots() {
     const BodyOf<Dim>& body = scene_.body;
-    dashpots_.edge_stiffness = (2 / dt) * body.edge_damping;
+    dashpots_.edge_stiffness = (2 / dt_) * body.edge_damping;
     for (int e = 0; e < body.edge_count(); ++e) {
       const int i = body.edges(0, e), j = body.edges(1, e);
-      const VectorOf<Dim> span = start_.x.col(j) - start_.x.col(i);
-      const VectorOf<Dim> foreseen = span + 0.5 * dt * (start_.v.col(j) - start_.v.col(i));
-      const double length = foreseen.norm();
-      dashpots_.rest_length[e] = length > 0 ? foreseen.dot(span) / length : 0;
+      const VectorOf<Dim> along = middle_.col(j) - middle_.col(i);
+      const double length = along.norm();
+      dashpots_.rest_length[e] = length > 0 ? along.dot(start_.x.col(j) - start_.x.col(i)) / length : 0;
+    }
+  }
+
+  /// What the potential takes as given, friction limits and rest lengths of dashpots, as it is at `x`.
+  void update_given(const PointsOf<Dim>& x) {
+    if (contact_.is_needed()) contact_.update_friction(x);
+    if (forces_.has_dashpots()) {
+      middle_ = 0.5 * (start_.x + x);
+      lay_dashpots();
     }
   }
 
@@ -197,22 +212,22 @@ class ImplicitStepper final : public StepperOf<Dim> {
     find_residual(x);
     count_ = 0;
     since_matrix_ = 0;
-    double enough = kResidual * size_, part = 1, last = std::numeric_limits<double>::infinity();
+    double enough = kResidual * speed_, part = 1, last = std::numeric_limits<double>::infinity();
     int k = 0, updates = 0;
     for (; k < kIterations; ++k) {
       if (residual_speed() <= enough) {
-        if (!contact_.is_needed()) break;
-        contact_.update_friction(x);
+        if (!contact_.is_needed() && !forces_.has_dashpots()) break;
+        update_given(x);
         find_residual(x);
         count_ = 0;  // the pairs are of another potential
-        if (residual_speed() <= kResidual * size_) break;
-        if (++updates > kFreeUpdates) {
+        if (residual_speed() <= kResidual * speed_) break;
+        if (++updates > kFreeUpdates && contact_.is_needed()) {
           if (residual_speed() > kShorterUpdate * last) part *= kShorterUpdate;
           last = residual_speed();
           contact_.shorten_friction_update(part);
           find_residual(x);
         }
-        enough = std::max(kResidual * size_, kInnerDecrease * residual_speed());
+        enough = std::max(kResidual * speed_, kInnerDecrease * residual_speed());
       }
       if (!has_matrix_ || since_matrix_ >= kPatience) {
         if (!make_matrix(x)) return false;
@@ -226,9 +241,9 @@ class ImplicitStepper final : public StepperOf<Dim> {
       }
     }
     if (k > kSlow) has_matrix_ = false;
-    if (contact_.is_needed()) contact_.update_friction(x);
+    update_given(x);
     find_residual(x);
-    return residual_speed() <= kGivenUp * size_;
+    return residual_speed() <= kGivenUp * speed_;
   }
 
   bool make_matrix(const PointsOf<Dim>& x) {
@@ -333,7 +348,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
   InternalForces<Dim> forces_;
   SystemMatrixOf<Dim> matrix_;
   PenaltyContact<Dim> contact_;
-  double size_, dt_ = 0;  // [m], [s]
+  double size_, speed_, dt_ = 0;  // [m], [m/s], [s]
   Eigen::VectorXd inverse_mass_, ones_;
   BodyOf<Dim> dashpots_;    // as springs of this step
   PointsOf<Dim> foreseen_;  // [m] where velocities, gravity and effects alone take the nodes

@@ -61,6 +61,8 @@ ControlMesh build_control_mesh(const Skeleton& skeleton, const SkinnedMesh& skin
   const TriangleSoup closed = with_closed_holes(skin.vertices, skin.triangles);
   const std::vector<Eigen::Vector3i> lattices =
       options.lattice.isZero() ? ranked_lattices(skin, closed, options) : std::vector<Eigen::Vector3i>{options.lattice};
+  if (lattices.empty())
+    throw Error("", "mesh", "the body is too long and thin for 5000 control nodes", "Shorten or thicken it.");
   const std::size_t tries = std::min<std::size_t>(3, lattices.size());
   ControlMesh best;
   double least = std::numeric_limits<double>::infinity();

@@ -500,8 +500,8 @@ TEST(InfoCommand, TellsWhatAnAnimatorAsks) {
   const FileInfo trot = inspect(kSamples + "/boxdog_trot.fbx");
   const ClipInfo& clip = trot.clips.front();
   EXPECT_LT(clip.closure_defect_length, 0.001);
-  EXPECT_GT(clip.max_strain, 0.05);
-  EXPECT_LT(clip.max_strain, 1);
+  EXPECT_GT(clip.max_strain, 0.2);
+  EXPECT_LT(clip.max_strain, 0.35);  // legs that stand side by side do not pull at each other
   ASSERT_EQ(clip.contacts.size(), 4u);  // its paws
   std::map<std::string, double> lifts_s;
   for (const ContactInfo& contact : clip.contacts) {

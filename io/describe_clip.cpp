@@ -79,7 +79,7 @@ std::vector<int> owners(const Rig& rig, Eigen::Index points) {
   return bones;
 }
 
-/// The lowest point of what each bone moves, over S + 1 times of a clip.
+/// The lowest point of what each bone moves, over equal steps of a clip's time.
 struct LowPoints {
   Eigen::MatrixXd height;  // [m] bones x times; infinite of a bone that moves nothing
   Eigen::MatrixXd speed;   // [m/s] horizontal, of that point against the ground, to the time before or after: the lesser
@@ -282,8 +282,10 @@ std::optional<Rig> body_of(const Rig& rig) {
   return body;
 }
 
-int contact_steps(const Rig& body, double range_s) {
-  const double most = kMostPoints / static_cast<double>(std::max<Eigen::Index>(1, body.skin.vertices.cols()));
+int contact_steps(const Rig& body, const Scene& scene, double range_s) {
+  const auto points = static_cast<double>(body.skin.vertices.cols());
+  const auto nodes = static_cast<double>(scene.nodes.size() + body.skeleton.names.size());
+  const double most = kMostPoints / std::max(1.0, points + 4 * nodes);
   return std::clamp(static_cast<int>(std::min(kContactRate * range_s, most)), kFewestSteps, kMostSteps);
 }
 
@@ -319,7 +321,7 @@ void describe_travel(const Rig& rig, const Scene& scene, const SceneClip& clip, 
   info.max_strain = max_strain(*body, is_skin ? frames : frames_of(*body, scene, clip, range));
   const Eigen::Vector3d ground_velocity =
       info.in_place ? Eigen::Vector3d(slide / range.length_s()) : Eigen::Vector3d::Zero();
-  const int steps = contact_steps(*body, range.length_s());
+  const int steps = contact_steps(*body, scene, range.length_s());
   info.contacts =
       contacts_of(*body, low_points(*body, scene, clip, range, steps, ground_velocity), length, range.length_s());
 }

@@ -52,14 +52,14 @@ struct BoxInfo {
   Eigen::Vector3d min, max;
 };
 
-/// When a bone's skin, or the capsule that a conversion gives it, is on the ground: its lowest point is within 1 % of L
-/// of the height that a conversion takes for the ground; where it goes faster than half the RMS speed of all bones' lowest
-/// points (and than 0.1 sqrt(g L)), within 0.2 %. Speeds of a clip in place are against ground that runs as its feet do. Seen
-/// 60 times a second, at least at 61 times.
+/// When a bone's skin, or the capsule that a conversion gives it, is on the ground: its lowest point is within 1 % of L of
+/// the height that a conversion takes for the ground; where it goes faster than half the RMS speed of all bones' lowest
+/// points (and than 0.1 sqrt(g L)), within 0.2 %. Speeds of a clip in place are against ground that runs as its feet do.
+/// Looked for 60 times a second, at least at 61 times; less often in clips of many points.
 struct ContactInfo {
   std::string bone;                                // that moves these vertices most
   double duty = 0;                                 // share of range_s [-]
-  std::vector<std::pair<double, double>> times_s;  // from, until; 0 is the first key; apart and long by 0.067 s
+  std::vector<std::pair<double, double>> times_s;  // from, until; 0 is the first key; 0.067 s long and apart
 };
 
 /// A morph target that a clip moves.

@@ -22,29 +22,20 @@ struct InfoOptions {
   io::ImportOptions import;
 };
 
-constexpr double kStill = 1e-6;  // [m/s]
+constexpr double kStill = 0.002,
+                 kClosed = 1e-4;  // of the length: travel, and distance of the end from the start, that are none
 
-void print_clip(const io::ClipInfo& clip) {
-  const Eigen::Vector3d size = clip.bbox.front().max - clip.bbox.front().min;
-  std::printf("clip %d '%s': %.3f s (%.3f s of keys at %.4g Hz), starts %.4g x %.4g x %.4g m\n", clip.index,
-              clip.name.c_str(), clip.duration_s, clip.range_s, clip.rate_hz, size.x(), size.y(), size.z());
-  if (clip.range_s == 0) {
-    std::puts("  a pose, not a clip");
-    return;
-  }
-  std::printf("  %s: its end is %.2g %% of its length from its start\n", clip.loop ? "loop" : "one-shot",
-              100 * clip.closure_defect_length);
-  if (clip.in_place) {
-    std::printf("  in place: its feet slide at %.3g m/s, the speed to give it back (--root-motion)\n", clip.foot_speed_m_s);
-  } else if (clip.speed_m_s < kStill) {
-    std::puts("  stays where it is");
+void print_loop(const io::ClipInfo& clip) {
+  std::printf("  %s: ", clip.loop ? "loop" : "one-shot");
+  if (clip.closure_defect_length < kClosed) {
+    std::puts("it ends as it begins");
   } else {
-    std::printf("  travels at %.3g m/s\n", clip.speed_m_s);
+    std::printf("its end is %.2g %% of its length from its start\n", 100 * clip.closure_defect_length);
   }
-  if (clip.max_strain > 0) std::printf("  asks the skin to change its lengths by up to %.0f %%\n", 100 * clip.max_strain);
-  for (const io::MorphInfo& morph : clip.morphs)
-    std::printf("  moves morph target '%s' of '%s': %.3g to %.3g\n", morph.name.c_str(), morph.mesh.c_str(), morph.min,
-                morph.max);
+}
+
+void print_contacts(const io::ClipInfo& clip) {
+  if (clip.contacts.empty()) std::puts("  never on the ground");
   for (const io::ContactInfo& contact : clip.contacts) {
     std::printf("  on the ground: %s, %.0f %% of the time:", contact.bone.c_str(), 100 * contact.duty);
     for (const auto& [from_s, until_s] : contact.times_s) std::printf(" %.2f-%.2f", from_s, until_s);
@@ -52,9 +43,33 @@ void print_clip(const io::ClipInfo& clip) {
   }
 }
 
+void print_clip(const io::ClipInfo& clip) {
+  const Eigen::Vector3d size = clip.bbox.front().max - clip.bbox.front().min;
+  std::printf("clip %d '%s': %.3f s (%.3f s of keys at %.4g Hz), starts %.4g m high, %.4g x %.4g m on the ground\n",
+              clip.index, clip.name.c_str(), clip.duration_s, clip.range_s, clip.rate_hz, size.y(), size.x(), size.z());
+  if (clip.range_s == 0) {
+    std::puts("  a pose, not a clip");
+    return;
+  }
+  print_loop(clip);
+  if (clip.in_place) {
+    std::printf("  in place: its feet slide at %.3g m/s; 'convert' lets it travel at that (--root-motion says otherwise)\n",
+                clip.foot_speed_m_s);
+  } else if (clip.speed_m_s * clip.range_s < kStill * size.maxCoeff()) {
+    std::puts("  stays where it is");
+  } else {
+    std::printf("  travels at %.3g m/s, %.3g m in all\n", clip.speed_m_s, clip.speed_m_s * clip.range_s);
+  }
+  if (clip.max_strain > 0) std::printf("  asks a soft body to change its lengths by up to %.0f %%\n", 100 * clip.max_strain);
+  for (const io::MorphInfo& morph : clip.morphs)
+    std::printf("  moves morph target '%s' of '%s': %.3g to %.3g\n", morph.name.c_str(), morph.mesh.c_str(), morph.min,
+                morph.max);
+  print_contacts(clip);
+}
+
 void print(const io::FileInfo& info) {
-  std::printf("%s: %s, %g m per unit, %s up\n", info.file.c_str(), info.format.c_str(), info.metres_per_unit,
-              info.up.c_str());
+  std::printf("%s: %s, %g m per unit (%s), %s up (%s)\n", info.file.c_str(), info.format.c_str(), info.metres_per_unit,
+              info.unit_reason.c_str(), info.up.c_str(), info.up_reason.c_str());
   const auto weighted =
       std::count_if(info.bones.begin(), info.bones.end(), [](const io::BoneInfo& bone) { return bone.weighted; });
   std::printf("%zu bones, %td of them move skin", info.bones.size(), weighted);

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
 #include <set>
 
 #include "io/capsules.h"
@@ -14,10 +17,20 @@ namespace hydrostat::io {
 namespace {
 
 constexpr std::array<double, 5> kFractions{0, 0.15, 0.4, 0.7, 1};
-constexpr double kLoopDefect = 0.02, kInPlaceTravel = 0.05, kSlide = 0.1, kLow = 0.03, kContact = 0.01;  // relative to L
+constexpr double kLoopDefect = 0.02, kInPlaceTravel = 0.05, kSlide = 0.1, kLow = 0.03;  // relative to L
 constexpr int kFrames = 30;
+constexpr double kContact = 0.01;    // of L: how high skin may be that is on the ground,
+constexpr double kRest = 0.002;      // and skin that goes fast over it
+constexpr double kFast = 0.5;        // of the RMS speed of what the bones move, and
+constexpr double kLeastFast = 0.1;   // of sqrt(g L) at least
+constexpr double kContactRate = 60;  // [Hz] at which contacts are looked for,
+constexpr double kMostPoints = 2e7;  // unless that were more points in all
+constexpr int kFewestSteps = 60, kMostSteps = 5000;
+constexpr double kShortestContact = 0.067;  // [s]; shorter ones and shorter gaps are none, but of very short clips
 constexpr double kPercentile = 0.99;
-constexpr double kShortestEdge = 0.01;  // of L: shorter ones are creases of the mesh
+constexpr double kShortestBond = 0.02, kLongestBond = 0.08;  // of the bind pose's extent
+constexpr double kThinning = 0.03;                           // distance of the vertices that bonds join
+constexpr std::size_t kMostInCell = 300;                     // of these vertices
 
 /// The skinned vertices [m], or the joints where there is no mesh, at a time of the clip.
 Eigen::Matrix3Xd points_at(const Rig& rig, const Scene& scene, const SceneClip& clip, double time_s) {
@@ -36,17 +49,8 @@ double lowest_of(const std::vector<Eigen::Matrix3Xd>& frames) {
   return floor;
 }
 
-/// The ground as a conversion takes it.
-double ground_of(const std::vector<Eigen::Matrix3Xd>& frames) {
-  retarget::Motion lowest;
-  lowest.frames.setZero(3, static_cast<Eigen::Index>(frames.size()));
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    lowest.frames(1, static_cast<Eigen::Index>(f)) = frames[f].row(1).minCoeff();
-  return retarget::ground_height(lowest);
-}
-
 /// How far the low points slide in all [m]: the mean horizontal step of the points within 3 % of L of the lowest, summed.
-double slide_of_low_points(const std::vector<Eigen::Matrix3Xd>& frames, double length) {
+Eigen::Vector3d slide_of_low_points(const std::vector<Eigen::Matrix3Xd>& frames, double length) {
   const double floor = lowest_of(frames);
   Eigen::Vector3d slide = Eigen::Vector3d::Zero();
   for (std::size_t f = 1; f < frames.size(); ++f) {
@@ -59,7 +63,7 @@ double slide_of_low_points(const std::vector<Eigen::Matrix3Xd>& frames, double l
     }
     if (low > 0) slide += horizontal(step) / low;
   }
-  return slide.norm();
+  return slide;
 }
 
 /// The bone that moves each point most.
@@ -75,27 +79,98 @@ std::vector<int> owners(const Rig& rig, Eigen::Index points) {
   return bones;
 }
 
-std::vector<ContactInfo> contacts_of(const Rig& rig, const std::vector<Eigen::Matrix3Xd>& frames, double length,
-                                     double range_s) {
-  const double reach = ground_of(frames) + kContact * length;
-  const std::vector<int> bone_of = owners(rig, frames.front().cols());
-  const std::size_t count = rig.skeleton.names.size();
-  std::vector<std::vector<bool>> on(frames.size(), std::vector<bool>(count, false));
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    for (Eigen::Index p = 0; p < frames[f].cols(); ++p) {
-      if (frames[f](1, p) <= reach) on[f][static_cast<std::size_t>(bone_of[static_cast<std::size_t>(p)])] = true;
+/// The lowest point of what each bone moves, over equal steps of a clip's time.
+struct LowPoints {
+  Eigen::MatrixXd height;  // [m] bones x times; infinite of a bone that moves nothing
+  Eigen::MatrixXd speed;   // [m/s] horizontal, of that point against the ground, to the time before or after: the lesser
+};
+
+LowPoints low_points(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range, int steps,
+                     const Eigen::Vector3d& ground_velocity) {
+  const double step_s = range.length_s() / steps;
+  const auto bones = static_cast<Eigen::Index>(rig.skeleton.names.size());
+  LowPoints low;
+  low.height.setConstant(bones, steps + 1, std::numeric_limits<double>::infinity());
+  low.speed = low.height;
+  std::vector<int> bone_of;
+  Eigen::Matrix3Xd before;
+  std::vector<Eigen::Index> lowest(rig.skeleton.names.size()), lowest_before;
+  for (int f = 0; f <= steps; ++f) {
+    const Eigen::Matrix3Xd now = points_at(rig, scene, clip, range.start_s + f * step_s);
+    if (f == 0) bone_of = owners(rig, now.cols());
+    for (Eigen::Index p = 0; p < now.cols(); ++p) {
+      const int b = bone_of[static_cast<std::size_t>(p)];
+      if (!(now(1, p) < low.height(b, f))) continue;
+      low.height(b, f) = now(1, p);
+      lowest[static_cast<std::size_t>(b)] = p;
     }
+    for (Eigen::Index b = 0; f > 0 && b < bones; ++b) {
+      if (!std::isfinite(low.height(b, f))) continue;
+      const auto speed_of = [&](Eigen::Index p) {
+        return horizontal((now.col(p) - before.col(p)) / step_s - ground_velocity).norm();
+      };
+      low.speed(b, f) = speed_of(lowest[static_cast<std::size_t>(b)]);
+      low.speed(b, f - 1) = std::min(low.speed(b, f - 1), speed_of(lowest_before[static_cast<std::size_t>(b)]));
+    }
+    before = now;
+    lowest_before = lowest;
   }
+  return low;
+}
+
+/// The ground as a conversion takes it.
+double ground_of(const LowPoints& low) {
+  retarget::Motion lowest;
+  lowest.frames.setZero(3, low.height.cols());
+  lowest.frames.row(1) = low.height.colwise().minCoeff();
+  return retarget::ground_height(lowest);
+}
+
+double rms_speed(const LowPoints& low) {
+  double squared = 0;
+  Eigen::Index count = 0;
+  for (Eigen::Index b = 0; b < low.speed.rows(); ++b) {
+    if (!std::isfinite(low.speed(b, 0))) continue;  // moves nothing
+    squared += low.speed.row(b).squaredNorm();
+    count += low.speed.cols();
+  }
+  return count == 0 ? 0 : std::sqrt(squared / static_cast<double>(count));
+}
+
+/// Runs of `what` shorter than `least`, between others, become as these.
+void close_gaps(std::vector<bool>& on, bool what, std::size_t least) {
+  for (std::size_t from = 0; from < on.size();) {
+    std::size_t until = from;
+    while (until < on.size() && on[until] == on[from]) ++until;
+    if (on[from] == what && from > 0 && until < on.size() && until - from < least)
+      std::fill(on.begin() + static_cast<std::ptrdiff_t>(from), on.begin() + static_cast<std::ptrdiff_t>(until), !what);
+    from = until;
+  }
+}
+
+std::vector<ContactInfo> contacts_of(const Rig& rig, const LowPoints& low, double length, double range_s) {
+  const double ground = ground_of(low);
+  const double fast = std::max(kFast * rms_speed(low), kLeastFast * std::sqrt(9.81 * length));
+  const auto count = static_cast<std::size_t>(low.height.cols());
+  const double step_s = range_s / static_cast<double>(count - 1);
+  const auto least = std::min<std::size_t>(static_cast<std::size_t>(kShortestContact / step_s), count / 20);
   std::vector<ContactInfo> contacts;
-  const double step_s = range_s / kFrames;
-  for (std::size_t b = 0; b < count; ++b) {
+  for (Eigen::Index b = 0; b < low.height.rows(); ++b) {
+    std::vector<bool> on;
+    for (Eigen::Index f = 0; f < low.height.cols(); ++f) {
+      const double reach = low.speed(b, f) <= fast ? kContact : kRest;
+      on.push_back(low.height(b, f) <= ground + reach * length);
+    }
+    close_gaps(on, false, least);
+    close_gaps(on, true, least);
     ContactInfo contact;
-    contact.bone = rig.skeleton.names[b];
-    for (std::size_t f = 0; f < frames.size(); ++f) {
-      const double time_s = static_cast<double>(f) * step_s;
-      if (!on[f][b]) continue;
-      if (f == 0 || !on[f - 1][b]) contact.times_s.emplace_back(time_s, time_s);
-      contact.times_s.back().second = time_s;
+    contact.bone = rig.skeleton.names[static_cast<std::size_t>(b)];
+    // Each time that was looked at stands for half a step before and after it.
+    for (std::size_t f = 0; f < count; ++f) {
+      if (!on[f]) continue;
+      const double from_s = std::max(0.0, (static_cast<double>(f) - 0.5) * step_s);
+      if (f == 0 || !on[f - 1]) contact.times_s.emplace_back(from_s, from_s);
+      contact.times_s.back().second = std::min(range_s, (static_cast<double>(f) + 0.5) * step_s);
     }
     for (const auto& [from_s, until_s] : contact.times_s) contact.duty += (until_s - from_s) / range_s;
     if (!contact.times_s.empty()) contacts.push_back(std::move(contact));
@@ -103,21 +178,56 @@ std::vector<ContactInfo> contacts_of(const Rig& rig, const std::vector<Eigen::Ma
   return contacts;
 }
 
-/// Lengths of the skin's edges, without those that are creases of the bind pose, relative to it.
-class Edges {
+/// The bone above that moves skin, of each bone; -1: none.
+std::vector<int> weighted_parents(const retarget::Skeleton& skeleton) {
+  std::vector<int> parents(skeleton.names.size(), -1);
+  for (std::size_t b = 0; b < parents.size(); ++b) {
+    int above = skeleton.parents[b];
+    while (above >= 0 && !skeleton.weighted[static_cast<std::size_t>(above)])
+      above = skeleton.parents[static_cast<std::size_t>(above)];
+    parents[b] = above;
+  }
+  return parents;
+}
+
+/// What would hold a soft body in this skin together: bonds between vertices that are near each other in the bind pose and
+/// belong to one bone or to neighbours, whether triangles join them or not. So the segments of a spider hang together, and
+/// two legs that stand side by side do not.
+class Bonds {
  public:
-  explicit Edges(const Rig& rig) : skin_(rig.skin) {
+  explicit Bonds(const Rig& rig) : skin_(rig.skin) {
     if (skin_.triangles.cols() == 0) return;
-    const double extent = (skin_.vertices.rowwise().maxCoeff() - skin_.vertices.rowwise().minCoeff()).maxCoeff();
-    std::set<std::pair<int, int>> all;
-    for (Eigen::Index t = 0; t < skin_.triangles.cols(); ++t) {
-      for (int c = 0; c < 3; ++c) {
-        const int a = skin_.triangles(c, t), b = skin_.triangles((c + 1) % 3, t);
-        if ((skin_.vertices.col(a) - skin_.vertices.col(b)).norm() > kShortestEdge * extent)
-          all.emplace(std::min(a, b), std::max(a, b));
+    const Eigen::Vector3d low = skin_.vertices.rowwise().minCoeff();
+    const double extent = (skin_.vertices.rowwise().maxCoeff() - low).maxCoeff();
+    if (!(extent > 0) || !std::isfinite(extent)) return;
+    const std::vector<int> bone_of = owners(rig, skin_.vertices.cols()), parents = weighted_parents(rig.skeleton);
+    const auto are_neighbours = [&](int a, int b) {
+      return a == b || parents[static_cast<std::size_t>(a)] == b || parents[static_cast<std::size_t>(b)] == a;
+    };
+    // One vertex of a bone in each small cell; sought in large ones.
+    std::set<std::array<int, 4>> taken;
+    std::map<std::array<int, 3>, std::vector<int>> cells;
+    const auto cell_of = [&](int v, double size) {
+      const Eigen::Vector3i cell = ((skin_.vertices.col(v) - low) / (size * extent)).array().floor().cast<int>();
+      return std::array{cell.x(), cell.y(), cell.z()};
+    };
+    for (int v = 0; v < static_cast<int>(skin_.vertices.cols()); ++v) {
+      const int bone = bone_of[static_cast<std::size_t>(v)];
+      const auto [x, y, z] = cell_of(v, kThinning);
+      if (!taken.insert({x, y, z, bone}).second) continue;
+      const std::array<int, 3> home = cell_of(v, kLongestBond);
+      for (int n = 0; n < 27; ++n) {
+        const auto near = cells.find({home[0] + n % 3 - 1, home[1] + n / 3 % 3 - 1, home[2] + n / 9 - 1});
+        if (near == cells.end()) continue;
+        for (const int other : near->second) {
+          const double distance = (skin_.vertices.col(v) - skin_.vertices.col(other)).norm();
+          if (distance >= kShortestBond * extent && distance <= kLongestBond * extent &&
+              are_neighbours(bone, bone_of[static_cast<std::size_t>(other)]))
+            pairs_.emplace_back(other, v);
+        }
       }
+      if (std::vector<int>& cell = cells[home]; cell.size() < kMostInCell) cell.push_back(v);
     }
-    pairs_.assign(all.begin(), all.end());
   }
 
   std::vector<double> stretches(const Eigen::Matrix3Xd& points) const {
@@ -138,16 +248,16 @@ double percentile(std::vector<double> values, double share) {
   return *at;
 }
 
-/// The bind pose may be of another size than the clip: the median edge of the first key keeps its length.
+/// The bind pose may be of another size than the clip: the median bond of the first key keeps its length.
 double max_strain(const Rig& rig, const std::vector<Eigen::Matrix3Xd>& frames) {
-  const Edges edges(rig);
-  std::vector<double> stretches = edges.stretches(frames.front());
+  const Bonds bonds(rig);
+  std::vector<double> stretches = bonds.stretches(frames.front());
   if (stretches.empty()) return 0;
   const double scale = percentile(stretches, 0.5);
   if (!(scale > 0)) return 0;
   double most = 0;
   for (const Eigen::Matrix3Xd& frame : frames) {
-    stretches = edges.stretches(frame);
+    stretches = bonds.stretches(frame);
     for (double& stretch : stretches) stretch = std::abs(stretch / scale - 1);
     most = std::max(most, percentile(std::move(stretches), kPercentile));
   }
@@ -161,20 +271,22 @@ std::vector<Eigen::Matrix3Xd> frames_of(const Rig& rig, const Scene& scene, cons
   return frames;
 }
 
-/// A skeleton alone touches the ground with the body that a conversion gives it.
-void describe_contacts(const Rig& rig, const Scene& scene, const SceneClip& clip, const ClipRange& range,
-                       const std::vector<Eigen::Matrix3Xd>& frames, double length, ClipInfo& info) {
-  if (rig.skin.vertices.cols() > 0) {
-    info.contacts = contacts_of(rig, frames, length, range.length_s());
-    return;
-  }
+/// The body that a conversion gives the rig: its own skin, or capsules along the bones of a skeleton alone.
+std::optional<Rig> body_of(const Rig& rig) {
   Rig body = rig;
   try {
-    add_capsules(body, "");
+    if (rig.skin.vertices.cols() == 0) add_capsules(body, "");
   } catch (const Error&) {
-    return;  // no bone has a length
+    return std::nullopt;  // no bone has a length
   }
-  info.contacts = contacts_of(body, frames_of(body, scene, clip, range), length, range.length_s());
+  return body;
+}
+
+int contact_steps(const Rig& body, const Scene& scene, double range_s) {
+  const auto points = static_cast<double>(body.skin.vertices.cols());
+  const auto nodes = static_cast<double>(scene.nodes.size() + body.skeleton.names.size());
+  const double most = kMostPoints / std::max(1.0, points + 4 * nodes);
+  return std::clamp(static_cast<int>(std::min(kContactRate * range_s, most)), kFewestSteps, kMostSteps);
 }
 
 std::vector<MorphInfo> morphs_of(const Scene& scene, const SceneClip& clip) {
@@ -197,14 +309,21 @@ void describe_travel(const Rig& rig, const Scene& scene, const SceneClip& clip, 
   const Eigen::Matrix3Xd shift = frames.back() - first;
   const Eigen::Vector3d travel = horizontal(shift.rowwise().mean());
   const double defect = std::sqrt((shift.colwise() - travel).colwise().squaredNorm().mean());
-  const double slide = slide_of_low_points(frames, length);
+  const Eigen::Vector3d slide = slide_of_low_points(frames, length);
   info.loop = defect <= kLoopDefect * length;
-  info.in_place = info.loop && travel.norm() < kInPlaceTravel * length && slide > kSlide * length;
+  info.in_place = info.loop && travel.norm() < kInPlaceTravel * length && slide.norm() > kSlide * length;
   info.speed_m_s = travel.norm() / range.length_s();
-  info.foot_speed_m_s = slide / range.length_s();
+  info.foot_speed_m_s = slide.norm() / range.length_s();
   info.closure_defect_length = length > 0 ? defect / length : 0;
-  info.max_strain = max_strain(rig, frames);
-  describe_contacts(rig, scene, clip, range, frames, length, info);
+  const std::optional<Rig> body = body_of(rig);
+  if (!body) return;
+  const bool is_skin = rig.skin.vertices.cols() > 0;
+  info.max_strain = max_strain(*body, is_skin ? frames : frames_of(*body, scene, clip, range));
+  const Eigen::Vector3d ground_velocity =
+      info.in_place ? Eigen::Vector3d(slide / range.length_s()) : Eigen::Vector3d::Zero();
+  const int steps = contact_steps(*body, scene, range.length_s());
+  info.contacts =
+      contacts_of(*body, low_points(*body, scene, clip, range, steps, ground_velocity), length, range.length_s());
 }
 
 }  // namespace

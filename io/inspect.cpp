@@ -16,17 +16,41 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr double kSmallest = 0.01, kLargest = 30;  // [m]; what a creature's length lies between
+constexpr double kSmallest = 0.01, kLargest = 30;    // [m]; what a creature's length lies between
+constexpr double kUsualLeast = 0.1, kUsualMost = 5;  // [m]; where a guessed unit must bring it
 
 nlohmann::ordered_json to_list(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
 
-void warn_of_size(const ClipInfo& clip, std::vector<std::string>& warnings) {
+void warn_of_size(const ClipInfo& clip, double metres_per_unit, std::vector<std::string>& warnings) {
   const double length = (clip.bbox.front().max - clip.bbox.front().min).maxCoeff();
   if (length >= kSmallest && length <= kLargest) return;
-  std::array<char, 32> metres{};
-  std::snprintf(metres.data(), metres.size(), "%.3g", length);
-  warnings.push_back(std::string("The character is ") + metres.data() +
-                     " m long, which is no creature's size; give its height.");
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "The character is %.3g m long, which is no creature's size; give its height (--height).", length);
+  for (const double share : {0.01, 0.001, 100.0}) {
+    if (length * share < kUsualLeast || length * share > kUsualMost) continue;
+    std::snprintf(
+        text.data(), text.size(),
+        "The character is %.3g m long, which is no creature's size; if the file's unit were %.6g m it would be %.3g m "
+        "(--unit %.6g), or give its height (--height).",
+        length, metres_per_unit * share, length * share, metres_per_unit * share);
+    break;
+  }
+  warnings.emplace_back(text.data());
+}
+
+/// Why the file's numbers are taken for metres, and an axis for the one that points up, as they are.
+std::string unit_reason(const std::string& format, bool is_told) {
+  if (is_told) return "as --unit says";
+  if (format == "fbx") return "the file's UnitScaleFactor";
+  if (format == "gltf") return "glTF's unit is the metre";
+  return format == "bvh" ? "a guess, for BVH has no unit" : "the file's unit is in its nodes";
+}
+std::string up_reason(const std::string& format, bool is_told) {
+  if (is_told) return "as --up says";
+  if (format == "fbx") return "the file's UpAxis";
+  if (format == "gltf") return "glTF's axis";
+  return format == "bvh" ? "a guess, for BVH has no axes" : "the file's axis is in its nodes";
 }
 
 bool is_finite(const ClipInfo& clip) {
@@ -62,14 +86,19 @@ FileInfo inspect(const std::string& path, const ImportOptions& options) {
   info.format = scene.format;
   info.up = scene.up;
   info.metres_per_unit = scene.metres_per_unit;
+  info.unit_reason = unit_reason(scene.format, options.metres_per_unit > 0);
+  info.up_reason = up_reason(scene.format, !options.up.empty());
   for (std::size_t b = 0; b < rig.skeleton.names.size(); ++b) {
     const int parent = rig.skeleton.parents[b];
     info.bones.push_back({rig.skeleton.names[b], parent < 0 ? "" : rig.skeleton.names[static_cast<std::size_t>(parent)],
                           rig.skeleton.weighted[b]});
   }
   for (const SceneMesh& mesh : scene.meshes) {
-    info.meshes.push_back({mesh.name, static_cast<int>(mesh.vertices.cols()), static_cast<int>(mesh.triangles.cols()),
-                           !mesh.joints.empty(), {}});
+    info.meshes.push_back({mesh.name,
+                           static_cast<int>(mesh.vertices.cols()),
+                           static_cast<int>(mesh.triangles.cols()),
+                           !mesh.joints.empty(),
+                           {}});
     for (const SceneMesh::Morph& morph : mesh.morphs) info.meshes.back().morphs.push_back(morph.name);
   }
   for (std::size_t c = 0; c < scene.clips.size(); ++c) {
@@ -83,7 +112,7 @@ FileInfo inspect(const std::string& path, const ImportOptions& options) {
   info.network_confined = scene.network_confined;
   info.warnings = scene.warnings;
   info.warnings.insert(info.warnings.end(), rig.warnings.begin(), rig.warnings.end());
-  warn_of_size(info.clips[first_moving], info.warnings);
+  warn_of_size(info.clips[first_moving], info.metres_per_unit, info.warnings);
   return info;
 }
 
@@ -92,14 +121,12 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json_of(const FileInfo& info) {
-  Json json{{"schema", "hydrostat.info/1"},
-            {"file", info.file},
-            {"format", info.format},
-            {"metres_per_unit", info.metres_per_unit},
-            {"up", info.up},
-            {"bones", Json::array()},
-            {"meshes", Json::array()},
-            {"clips", Json::array()}};
+  Json json{{"schema", "hydrostat.info/1"}, {"file", info.file}, {"format", info.format}};
+  json["metres_per_unit"] = info.metres_per_unit;
+  json["unit_reason"] = info.unit_reason;
+  json["up"] = info.up;
+  json["up_reason"] = info.up_reason;
+  for (const char* list : {"bones", "meshes", "clips"}) json[list] = Json::array();
   for (const BoneInfo& bone : info.bones) {
     json["bones"].push_back({{"name", bone.name},
                              {"parent", bone.parent.empty() ? Json(nullptr) : Json(bone.parent)},

@@ -154,7 +154,8 @@ class RigBuilder {
       const bool flat =
           is_singular(rest_[static_cast<std::size_t>(carrier)]) || is_singular(rest_[static_cast<std::size_t>(mesh.node)]);
       if (mesh.is_wanted && !carried && !skinned_.empty()) {
-        rigid_parts_.push_back(mesh);  // its vertices go with the nearest bones
+        rigid_parts_.push_back(hung_on_nearest_bones(mesh));
+        rig_.warnings.push_back("Mesh '" + mesh.name + "' hangs on nothing; its vertices go with the nearest bones.");
         continue;
       }
       if (!carried || flat) {
@@ -174,6 +175,36 @@ class RigBuilder {
     rig_.warnings.push_back(std::to_string(count) + " of " + std::to_string(scene_.meshes.size()) +
                             " meshes are not bound to bones, nor hang on any that moves, and are left out: " + left_out +
                             ". Bind them, or name them with --mesh.");
+  }
+
+  /// The mesh, each of its vertices on the weighted bone that is nearest to where both stand at rest.
+  SceneMesh hung_on_nearest_bones(const SceneMesh& mesh) const {
+    retarget::Skeleton standing;
+    std::vector<int> place(scene_.nodes.size(), -1), nodes;
+    for (std::size_t n = 0; n < scene_.nodes.size(); ++n) {
+      if (!weighted_[n] || is_singular(rest_[n])) continue;
+      int parent = scene_.nodes[n].parent;
+      while (parent >= 0 && place[static_cast<std::size_t>(parent)] < 0) parent = node(parent).parent;
+      place[n] = standing.count();
+      standing.names.push_back(scene_.nodes[n].name);
+      standing.parents.push_back(parent < 0 ? -1 : place[static_cast<std::size_t>(parent)]);
+      standing.bind_pose.push_back(rest_[n]);
+      standing.weighted.push_back(true);
+      nodes.push_back(static_cast<int>(n));
+    }
+    SceneMesh hung = mesh;
+    std::map<int, SceneMesh::Joint> joints;
+    const Eigen::Affine3d& rest = rest_[static_cast<std::size_t>(mesh.node)];
+    for (int v = 0; v < mesh.vertices.cols(); ++v) {
+      const int bone = nearest_bone(standing, rest * mesh.vertices.col(v));
+      if (bone >= 0) joints[bone].weights.push_back({v, 1});
+    }
+    for (auto& [bone, joint] : joints) {
+      joint.node = nodes[static_cast<std::size_t>(bone)];
+      joint.inverse_bind_matrix = rest_[static_cast<std::size_t>(joint.node)].inverse() * rest;
+      hung.joints.push_back(std::move(joint));
+    }
+    return hung;
   }
 
   bool hangs_below_joint(int n) const {

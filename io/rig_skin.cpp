@@ -15,27 +15,7 @@ constexpr double kWeightGrid = 1e-3;  // difference of skin weights that keeps v
 constexpr double kNoWeight = 1e-6;    // sum of skin weights below which a vertex has none
 constexpr std::size_t kMostCompared = 64;
 
-int nearest_bone(const retarget::Skeleton& skeleton, const Eigen::Vector3d& point) {
-  double least = std::numeric_limits<double>::infinity();
-  int nearest = -1;
-  const auto consider = [&](int bone, double distance) {
-    if (distance >= least || !skeleton.weighted[static_cast<std::size_t>(bone)]) return;
-    least = distance;
-    nearest = bone;
-  };
-  for (int b = 0; b < skeleton.count(); ++b) {
-    const Eigen::Vector3d end = skeleton.bind_pose[static_cast<std::size_t>(b)].translation();
-    consider(b, (point - end).norm());
-    const int parent = skeleton.parents[static_cast<std::size_t>(b)];
-    if (parent < 0) continue;
-    const Eigen::Vector3d start = skeleton.bind_pose[static_cast<std::size_t>(parent)].translation();
-    const double along = (point - start).dot(end - start) / std::max((end - start).squaredNorm(), 1e-300);
-    consider(parent, (point - start - std::clamp(along, 0.0, 1.0) * (end - start)).norm());
-  }
-  return nearest;
-}
-
-/// Binds every vertex without weights to the weighted bone whose origin, or line to a child, is nearest.
+/// Binds every vertex without weights to the nearest bone.
 void bind_stray_vertices(Rig& rig) {
   int strays = 0;
   for (Eigen::Index v = 0; v < rig.skin.vertices.cols(); ++v) {
@@ -176,7 +156,8 @@ void face_outward(Rig& rig) {
 }
 
 /// What a mesh tells of its looks; `linear` takes mesh space to the common bind space.
-void add_looks(const SceneMesh& mesh, const Eigen::Matrix3d& linear, int first_vertex, Eigen::Index first_triangle, Rig& rig) {
+void add_looks(const SceneMesh& mesh, const Eigen::Matrix3d& linear, int first_vertex, Eigen::Index first_triangle,
+               Rig& rig) {
   RigMesh looks{first_vertex, {}, mesh.uvs, mesh.colours};
   if (mesh.normals.size() > 0) {
     // Normals go by the inverse transposed; the adjugate is that but for a factor, and does without a division.
@@ -222,6 +203,26 @@ void add_morphs(const SceneMesh& mesh, const Eigen::Matrix3d& linear, int first_
 }
 
 }  // namespace
+
+int nearest_bone(const retarget::Skeleton& skeleton, const Eigen::Vector3d& point) {
+  double least = std::numeric_limits<double>::infinity();
+  int nearest = -1;
+  const auto consider = [&](int bone, double distance) {
+    if (distance >= least || !skeleton.weighted[static_cast<std::size_t>(bone)]) return;
+    least = distance;
+    nearest = bone;
+  };
+  for (int b = 0; b < skeleton.count(); ++b) {
+    const Eigen::Vector3d end = skeleton.bind_pose[static_cast<std::size_t>(b)].translation();
+    consider(b, (point - end).norm());
+    const int parent = skeleton.parents[static_cast<std::size_t>(b)];
+    if (parent < 0) continue;
+    const Eigen::Vector3d start = skeleton.bind_pose[static_cast<std::size_t>(parent)].translation();
+    const double along = (point - start).dot(end - start) / std::max((end - start).squaredNorm(), 1e-300);
+    consider(parent, (point - start - std::clamp(along, 0.0, 1.0) * (end - start)).norm());
+  }
+  return nearest;
+}
 
 double extent_of(const Eigen::Matrix3Xd& points) {
   return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).maxCoeff();

@@ -6,6 +6,9 @@
 
 namespace hydrostat::io {
 
+/// The weighted bone whose origin, or line to a child, is nearest to a point of the bind pose; -1 where none is weighted.
+int nearest_bone(const retarget::Skeleton& skeleton, const Eigen::Vector3d& point);
+
 /// Longest side of the points' box.
 double extent_of(const Eigen::Matrix3Xd& points);
 

@@ -75,6 +75,7 @@ std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const Tria
                                              const BodyOptions& options) {
   constexpr double kRoughVoxels = 120;  // along the longest side
   constexpr double kLongestCell = 1.4;  // over the shortest side
+  constexpr double kMostNodes = 5000;
   const Eigen::Vector3d size = skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff();
   const double longest = size.maxCoeff();
   const Eigen::Vector3i rough_cells = (size * (kRoughVoxels / longest)).array().ceil().cwiseMax(1).cast<int>();
@@ -84,7 +85,9 @@ std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const Tria
   std::set<std::array<int, 3>> tried;
   std::vector<std::pair<double, std::array<int, 3>>> ranked;
   const double wanted = options.nodes > 0 ? options.nodes : 600;
-  for (double along = 1; along <= wanted / 3; along = std::max(along + 0.25, along * 1.01)) {
+  // A body that is longer and thinner than that takes more nodes than wanted, up to as many as there may be.
+  const auto is_sought = [&](double along) { return along <= wanted / 3 || (ranked.empty() && along <= kMostNodes / 3); };
+  for (double along = 1; is_sought(along); along = std::max(along + 0.25, along * 1.01)) {
     const Eigen::Vector3d exact = size * (along / longest);
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3i cells = (exact.array().floor().cast<int>() + corner_step(corner).array()).cwiseMax(1);

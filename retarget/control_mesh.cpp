@@ -21,6 +21,8 @@ ControlMesh mesh_in_lattice(const Skeleton& skeleton, const SkinnedMesh& skin, c
   const LimbTable different_limbs = bones_of_different_limbs(skeleton);
   const BodyVoxels body = body_voxels(skin, closed, lattice);
   BodyParts parts = find_parts(body, different_limbs);
+  if (parts.parts.empty())
+    throw Error("", "mesh", "the body is too thin to be filled", "Thicken it, or ask for more control nodes.");
   const std::vector<int> vertex_parts = parts_of_vertices(body, parts, different_limbs, skin);
   drop_slivers(body, vertex_parts, skin, least_fill, parts);
   ControlMesh mesh;
@@ -61,6 +63,8 @@ ControlMesh build_control_mesh(const Skeleton& skeleton, const SkinnedMesh& skin
   const TriangleSoup closed = with_closed_holes(skin.vertices, skin.triangles);
   const std::vector<Eigen::Vector3i> lattices =
       options.lattice.isZero() ? ranked_lattices(skin, closed, options) : std::vector<Eigen::Vector3i>{options.lattice};
+  if (lattices.empty())
+    throw Error("", "mesh", "the body is too long and thin for 5000 control nodes", "Shorten or thicken it.");
   const std::size_t tries = std::min<std::size_t>(3, lattices.size());
   ControlMesh best;
   double least = std::numeric_limits<double>::infinity();

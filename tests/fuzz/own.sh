@@ -23,7 +23,8 @@ objects=()
 for source in tests/fuzz/own_files_fuzz io/{signals_file,body_file,batch_manifest,scene_file,scene_shapes,scene_body,toml_reader,write_file}; do
   object=$out/objects/${source##*/}.o
   objects+=("$object")
-  [ "$object" -nt "$project/$source.cpp" ] || "$clang" "${flags[@]}" -c "$project/$source.cpp" -o "$object"
+  changed=$([ -e "$object" ] && find "$project/$source.cpp" "$project"/{io,physics,retarget,signal}/*.h -newer "$object" || echo all)
+  [ -z "$changed" ] || "$clang" "${flags[@]}" -c "$project/$source.cpp" -o "$object"
 done
 # The rest as hydrostat links it.
 mapfile -t libraries < <(ninja -C "$build" -t commands hydrostat | tail -n 1 | tr ' ' '\n' | grep -E '^-l|\.so|\.a$' | grep -v '^cli/')

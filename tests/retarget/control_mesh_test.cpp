@@ -206,6 +206,16 @@ TEST(ControlMesh, RefusesASkinWithoutBody) {
   EXPECT_THROW(build_control_mesh(one_bone(), damaged), Error);
 }
 
+TEST(ControlMesh, ALongThinBodyTakesMoreNodesThanWishedAndAThreadIsRefused) {
+  for (const SkinnedMesh& skin : {box_skin({0, 0, 0}, {0.2, 2, 0}), box_skin({0, 0, 0}, {0.1, 0.1, 4})}) {
+    const ControlMesh mesh = build_control_mesh(one_bone(), skin, {.nodes = 20});
+    EXPECT_EQ(mesh.pieces, 1);
+    EXPECT_GT(mesh.node_count(), 20);
+    EXPECT_LT(mesh.node_count(), 400);
+  }
+  EXPECT_THROW(build_control_mesh(one_bone(), box_skin({0, 0, 0}, {1e-4, 1e-4, 1}), {.nodes = 20}), Error);
+}
+
 TEST(BodyOptions, NameTheRuleTheyBreak) {
   EXPECT_EQ(broken_rule(BodyOptions{}), "");
   EXPECT_NE(broken_rule(BodyOptions{.nodes = 5}), "");

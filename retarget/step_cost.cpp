@@ -1,5 +1,7 @@
 #include "retarget/step_cost.h"
 
+#include "physics/system_matrix.h"
+
 namespace hydrostat::retarget {
 namespace {
 
@@ -39,6 +41,9 @@ constexpr Cost kPass[] = {{0, 6, 36, 37, 76, 0}, {0, 4, 39, 31, 200, 0}};  // im
 constexpr Cost kSweep[] = {{19, 14, 18, 80, 140, 0}, {0, 26, 58, 235, 850, 0}};
 constexpr Cost kAssembly[] = {{300, 0, 21, 516, 906, 0}, {67, 100, 0, 2940, 10100, 0}};
 constexpr double kProduct[] = {2.1, 15};  // [ns] of two blocks
+// Of corrections of a trot and a worm on 50 to 870 nodes, likewise.
+constexpr double kColumnProduct = 3.7;  // [ns] of a block and one of many columns
+constexpr double kNormal = 0.32;        // [ns] of a product in the normal equations
 
 const Cost& cost_of_pass(physics::Method method, int row) {
   if (method == physics::Method::kExplicit) return kSubstep[row];
@@ -56,5 +61,13 @@ double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, co
 }
 template double counted_ms<2>(const physics::SceneOf<2>&, physics::Method, const physics::StepWork&);
 template double counted_ms<3>(const physics::SceneOf<3>&, physics::Method, const physics::StepWork&);
+
+double counted_ms_of_correction(const physics::Scene& scene, Eigen::Index muscles) {
+  const Counts counts = counts_of(scene.body);
+  const physics::SystemMatrix matrix(scene.body);
+  const double columns = static_cast<double>(muscles) + 1;
+  return 1e-6 * (kAssembly[1].of(counts) + kProduct[1] * matrix.products_to_factor() +
+                 kColumnProduct * columns * matrix.products_to_solve() + kNormal * 3 * counts.nodes * columns * columns / 2);
+}
 
 }  // namespace hydrostat::retarget

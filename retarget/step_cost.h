@@ -9,4 +9,8 @@ namespace hydrostat::retarget {
 template <int Dim>
 double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, const physics::StepWork& work);
 
+/// The same of one correction by so many muscles: the body's matrix assembled and factored, solved with for every muscle, and
+/// the muscles' normal equations.
+double counted_ms_of_correction(const physics::Scene& scene, Eigen::Index muscles);
+
 }  // namespace hydrostat::retarget

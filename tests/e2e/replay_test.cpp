@@ -48,6 +48,31 @@ TEST_F(Replay, PlaysTheLayersOfTheSignals) {
   EXPECT_EQ(motion_bytes(creature_), motion);
 }
 
+TEST_F(Replay, OnOtherLevelsIsTheSameEachTimeAndRefusesWhatCannotBe) {
+  const std::string motion = motion_bytes(creature_);
+  const auto level = [&](const std::string& options, const std::string& file) {
+    const Outcome outcome = replay("--duration 0.3 -o " + file + " " + options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.out;
+  };
+  const std::string told = level("--lod 60 --threads 1", "one.glb");
+  EXPECT_NE(told.find("(solved on "), std::string::npos) << told;
+  level("--lod 60 --threads 2", "two.glb");
+  EXPECT_EQ(io::read_file(directory_.path / "one.glb"), io::read_file(directory_.path / "two.glb"));
+  level("--lod auto --budget 1000ms", "finest.glb");
+  EXPECT_GT(fs::file_size(directory_.path / "finest.glb"), fs::file_size(directory_.path / "one.glb")) << "four times the nodes";
+  EXPECT_EQ(motion_bytes(creature_), motion);
+  const Outcome too_little = replay("--lod auto --budget 0.001ms");
+  EXPECT_EQ(too_little.exit_code, 2);
+  EXPECT_NE(too_little.err.find("the cheapest, of "), std::string::npos) << too_little.err;
+  for (const char* options : {"--lod auto", "--lod 60 --budget 2ms", "--budget 2ms", "--lod 3", "--lod auto --budget soon"})
+    EXPECT_EQ(replay(options).exit_code, 2) << options;
+  fs::remove(creature_ / "rig.bin");
+  const Outcome old = replay("--lod 60");
+  EXPECT_EQ(old.exit_code, 1);
+  EXPECT_NE(old.err.find("rig.bin"), std::string::npos) << old.err;
+}
+
 TEST_F(Replay, WithAFileOfItsOwnLeavesTheCreatureAlone) {
   const std::string motion = motion_bytes(creature_), report = io::read_file(creature_ / "report.json");
   const std::set<std::string> files = names_in(creature_);

@@ -97,14 +97,14 @@ Eigen::MatrixXd squared_stretches(const physics::Body& body, const Motion& targe
 }
 
 /// The field along the constraints of another mesh: the mean of three places on each. E' x S.
-Eigen::MatrixXd evaluate(const Eigen::MatrixXd& tensors, const ControlMesh& solved, const Rig& rig,
-                         const ControlMesh& mesh) {
+Eigen::MatrixXd evaluate(const Eigen::MatrixXd& tensors, const ControlMesh& solved, const Rig& rig, const ControlMesh& mesh,
+                         const Eigen::Matrix2Xi& constraints) {
   constexpr double kOn[] = {1.0 / 6, 0.5, 5.0 / 6};
-  const Eigen::Index edges = mesh.edges.cols();
+  const Eigen::Index edges = constraints.cols();
   Eigen::Matrix3Xd points(3, 3 * edges);
   Eigen::MatrixXd bones(mesh.bone_weights.rows(), 3 * edges);
   for (Eigen::Index e = 0; e < edges; ++e) {
-    const int i = mesh.edges(0, e), j = mesh.edges(1, e);
+    const int i = constraints(0, e), j = constraints(1, e);
     for (int k = 0; k < 3; ++k) {
       points.col(3 * e + k) = (1 - kOn[k]) * mesh.nodes.col(i) + kOn[k] * mesh.nodes.col(j);
       bones.col(3 * e + k) = (1 - kOn[k]) * mesh.bone_weights.col(i) + kOn[k] * mesh.bone_weights.col(j);
@@ -113,7 +113,7 @@ Eigen::MatrixXd evaluate(const Eigen::MatrixXd& tensors, const ControlMesh& solv
   const Places places = locate(solved, rig.bone_weights, points, bones);
   Eigen::MatrixXd values = Eigen::MatrixXd::Zero(edges, tensors.cols());
   for (Eigen::Index e = 0; e < edges; ++e) {
-    const Direction direction = along((mesh.nodes.col(mesh.edges(1, e)) - mesh.nodes.col(mesh.edges(0, e))).normalized());
+    const Direction direction = along((mesh.nodes.col(constraints(1, e)) - mesh.nodes.col(constraints(0, e))).normalized());
     for (int k = 0; k < 3; ++k) {
       for (int c = 0; c < 4; ++c) {
         values.row(e) +=
@@ -388,7 +388,8 @@ SignalSet carried_signals(const Performer& solved, const SignalSet& signals, con
   const Eigen::MatrixXd loads = activation.cwiseAbs2() - squared_stretches(solved.scene.body, solved.prepared.target);
   const Eigen::MatrixXd tensors = tensors_along(solved.scene.body.rest, solved.scene.body.edges, loads);
   const Eigen::MatrixXd stretches = squared_stretches(body, level.prepared.target);
-  Eigen::MatrixXd carried = (stretches + evaluate(tensors, solved.mesh, rig, level.mesh)).cwiseMax(kLeastSquare).cwiseSqrt();
+  Eigen::MatrixXd carried =
+      (stretches + evaluate(tensors, solved.mesh, rig, level.mesh, body.edges)).cwiseMax(kLeastSquare).cwiseSqrt();
   even_out(level, carried);
   carried = carried.cwiseMax(1 - signals.limit).cwiseMin(1 + signals.limit).eval();
   const Eigen::MatrixXd lengths = (stretches.cwiseSqrt().transpose() * body.rest_length.asDiagonal()).eval();

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "tests/retarget/shapes.h"
 
@@ -26,13 +28,19 @@ struct Floating {
   Rig rig;
 };
 
-Floating floating_block(int nodes, const Eigen::Matrix3d& deform) {
+CreatureOptions options_for(int nodes, bool hexahedra) {
+  CreatureOptions options;
+  options.nodes = nodes;
+  options.hexahedra = hexahedra;
+  if (hexahedra) options.material = BodyMaterial::kStableNeoHookean;
+  return options;
+}
+
+Floating floating_block(int nodes, const Eigen::Matrix3d& deform, bool hexahedra = false) {
   Floating made;
   made.rig.skeleton = one_bone();
   made.rig.skin = box_skin({0, 0, 0}, {1, 0.4, 0.5}, 0, 8);
-  CreatureOptions options;
-  options.nodes = nodes;
-  const Creature creature = make_creature({made.rig.skeleton, made.rig.skin, {}}, options);
+  const Creature creature = make_creature({made.rig.skeleton, made.rig.skin, {}}, options_for(nodes, hexahedra));
   made.rig.bone_weights = creature.mesh.bone_weights;
   Performer& performer = made.performer;
   performer.skin = made.rig.skin;
@@ -90,11 +98,10 @@ TEST(TensorsAlong, FindTheFieldThatIsTheSameEverywhere) {
 TEST(AtLevel, CarriesAUniformStrainExactly) {
   Eigen::Matrix3d deform;
   deform << 1.15, 0.05, 0, 0, 1 / std::sqrt(1.15), 0.08, 0, 0, 1 / std::sqrt(1.15);
-  const Floating solved = floating_block(90, deform);
-  CreatureOptions options;
-  for (const int nodes : {40, 200}) {
-    options.nodes = nodes;
-    const Level level = at_level(solved.performer, solved.signals, solved.rig, options);
+  const std::array<std::pair<int, bool>, 3> cases{{{40, false}, {200, false}, {40, true}}};
+  for (const auto& [nodes, hexahedra] : cases) {
+    const Floating solved = floating_block(90, deform, hexahedra);
+    const Level level = at_level(solved.performer, solved.signals, solved.rig, options_for(nodes, hexahedra));
     const physics::Body& body = level.performer.scene.body;
     ASSERT_NE(body.node_count(), solved.performer.mesh.node_count());
     const Eigen::Matrix3Xd wanted = deform * body.rest;
@@ -105,7 +112,8 @@ TEST(AtLevel, CarriesAUniformStrainExactly) {
       const double stretch = (wanted.col(body.edges(1, e)) - wanted.col(body.edges(0, e))).norm() / body.rest_length[e];
       worst = std::max(worst, std::abs(played(0, e) - stretch));
     }
-    EXPECT_LT(worst, 1e-5) << nodes;
+    // Of elements the stress-free shape is the one that fits its constraints best: nearly, not to the digit, this one.
+    EXPECT_LT(worst, hexahedra ? 0.03 : 1e-5) << nodes;
     EXPECT_EQ(level.signals.samples(), solved.signals.samples());
     EXPECT_EQ(level.performer.muscles.names, solved.performer.muscles.names);
   }

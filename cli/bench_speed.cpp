@@ -16,7 +16,6 @@
 #include "io/import_worker.h"
 #include "io/write_file.h"
 #include "retarget/creature.h"
-#include "retarget/limbs.h"
 #include "retarget/performed_scenario.h"
 #include "retarget/run_warnings.h"
 #include "retarget/step_cost.h"
@@ -103,6 +102,32 @@ double reading_ms(const std::string& file, const io::ReadLimits& limits) {
   return 1e3 * least;
 }
 
+/// Simulation alone, and with the corrector, for a simulated second each.
+void measure_replay(const retarget::Performer& performer, const retarget::SignalSet& signals, physics::Method method,
+                    double duration_s, SpeedRow& row) {
+  retarget::SimulationOptions steps;
+  steps.method = method;
+  steps.dt_s = retarget::ReplayOptions().step_s;
+  steps.duration_s = duration_s;
+  steps.figures = false;
+  const retarget::ScenarioOf<3> scenario = retarget::performed_scenario(performer, signals);
+  retarget::Simulation simulation;
+  const double simulation_ms = ms_of(simulation, [&] { return retarget::simulate(scenario, steps); });
+  const double simulated_s = std::max(1, static_cast<int>(simulation.motion.count()) - 1) / simulation.motion.rate_hz;
+  row.simulation_ms = simulation_ms / simulated_s;
+  row.counted_ms = retarget::counted_ms(scenario.scene, method, simulation.work) / simulated_s;
+  retarget::PerformOptions perform;
+  perform.replay.method = method;
+  perform.replay.duration_s = duration_s;
+  perform.baselines = false;
+  perform.threads = 1;
+  retarget::Performances performances;
+  const double replay_ms = ms_of(performances, [&] { return retarget::perform(performer, signals, perform); });
+  const retarget::Replay& run = performances.main();
+  const double replayed_s = std::max(1, static_cast<int>(run.motion.count()) - 1) / run.motion.rate_hz;
+  row.correction_ms = std::max(0.0, replay_ms / replayed_s - row.simulation_ms);
+}
+
 SpeedRow measure(const SpeedCommand& command, const retarget::Character& character, int wished) {
   retarget::CreatureOptions settings;
   settings.nodes = wished;
@@ -116,14 +141,7 @@ SpeedRow measure(const SpeedCommand& command, const retarget::Character& charact
   row.coupling_ms = ms_of(motion, [&] { return retarget::import_motion(creature, settings); });
   row.frames = static_cast<int>(motion.nodes.count());
   retarget::PreparedTarget prepared;
-  row.preparation_ms = ms_of(prepared, [&] {
-    retarget::PreparedTarget found = retarget::prepare(
-        motion.nodes, retarget::preparation_scene(creature), retarget::bones_of(creature.contacts),
-        creature.character.skeleton.names, creature.mesh.bone_weights, creature.length, creature.size,
-        retarget::prepare_options(motion));
-    retarget::find_legs(creature.character.skeleton, found.contacts);
-    return found;
-  });
+  row.preparation_ms = ms_of(prepared, [&] { return prepared_target(creature, motion); });
   retarget::InverseOptions inverse_options;
   inverse_options.limit = retarget::automatic_limit(creature.scene.body, prepared.target);
   inverse_options.threads = 1;
@@ -134,28 +152,7 @@ SpeedRow measure(const SpeedCommand& command, const retarget::Character& charact
   const retarget::Performer performer = make_performer(creature, motion, std::move(prepared));
   retarget::SignalSet signals;
   row.signals_ms = ms_of(signals, [&] { return solved_signals(inverse, performer, command.clip_file, command.clip); });
-
-  retarget::SimulationOptions steps;
-  steps.method = settings.method;
-  steps.dt_s = retarget::ReplayOptions().step_s;
-  steps.duration_s = command.duration;
-  steps.figures = false;
-  const retarget::ScenarioOf<3> scenario = retarget::performed_scenario(performer, signals);
-  retarget::Simulation simulation;
-  const double simulation_ms = ms_of(simulation, [&] { return retarget::simulate(scenario, steps); });
-  const double simulated_s = std::max(1, static_cast<int>(simulation.motion.count()) - 1) / simulation.motion.rate_hz;
-  row.simulation_ms = simulation_ms / simulated_s;
-  row.counted_ms = retarget::counted_ms(scenario.scene, steps.method, simulation.work) / simulated_s;
-  retarget::PerformOptions perform;
-  perform.replay.method = settings.method;
-  perform.replay.duration_s = command.duration;
-  perform.baselines = false;
-  perform.threads = 1;
-  retarget::Performances performances;
-  const double replay_ms = ms_of(performances, [&] { return retarget::perform(performer, signals, perform); });
-  const retarget::Replay& run = performances.main();
-  const double replayed_s = std::max(1, static_cast<int>(run.motion.count()) - 1) / run.motion.rate_hz;
-  row.correction_ms = std::max(0.0, replay_ms / replayed_s - row.simulation_ms);
+  measure_replay(performer, signals, settings.method, command.duration, row);
   return row;
 }
 

@@ -25,7 +25,6 @@
 #include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/flight.h"
-#include "retarget/limbs.h"
 #include "retarget/run_warnings.h"
 
 namespace hydrostat::cli {
@@ -245,14 +244,7 @@ class Conversion {
   void find_activations(double wished_limit) {
     const physics::Scene& scene = creature_.scene;
     key_ = key_after(key_, options_.friction);
-    retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] {
-      retarget::PreparedTarget found = retarget::prepare(
-          motion_.nodes, retarget::preparation_scene(creature_), retarget::bones_of(creature_.contacts),
-          creature_.character.skeleton.names, creature_.mesh.bone_weights, creature_.length, creature_.size,
-          retarget::prepare_options(motion_));
-      retarget::find_legs(creature_.character.skeleton, found.contacts);
-      return found;
-    });
+    retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_); });
     retarget::InverseOptions inverse_options;
     inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);
     inverse_options.threads = options_.threads;

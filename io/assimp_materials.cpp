@@ -167,6 +167,15 @@ void read_looks(const aiMesh& theirs, int material, SceneMesh& ours) {
     for (unsigned v = 0; v < theirs.mNumVertices; ++v)
       ours.normals.col(v) << finite(theirs.mNormals[v].x), finite(theirs.mNormals[v].y), finite(theirs.mNormals[v].z);
   }
+  if (theirs.HasVertexColors(0)) {
+    ours.colours.resize(4, count);
+    for (unsigned v = 0; v < theirs.mNumVertices; ++v) {
+      const aiColor4D& told = theirs.mColors[0][v];
+      ours.colours.col(v) << share(told.r, 1), share(told.g, 1), share(told.b, 1), share(told.a, 1);
+    }
+    // One colour all over tells nothing but what programs fill in where there is none.
+    if (((ours.colours.colwise() - Eigen::Vector4d(ours.colours.col(0))).array() == 0).all()) ours.colours.resize(4, 0);
+  }
   for (unsigned set = 0; set < theirs.GetNumUVChannels(); ++set) {
     Eigen::Matrix2Xd places(2, count);
     for (unsigned v = 0; v < theirs.mNumVertices; ++v) {

@@ -11,6 +11,7 @@ namespace {
 constexpr Eigen::Index kMostTurning = 4;
 constexpr Eigen::Index kSamples = 64;  // frames that the targets are fitted to
 constexpr double kEnough = 0.02;       // of the RMS offset
+constexpr double kUnseen = 1e-4;       // of the body's longest side, RMS
 
 /// The vertices that some target moves, how the body turns at each, and where the targets take them.
 class MorphedSkin {
@@ -144,7 +145,9 @@ PlayedMorphs play_morphs(const retarget::MovingMorphs& morphs, const retarget::E
     left.col(s) = left_at(sample(s, samples, skin.frames()));
     worn += skin.worn(sample(s, samples, skin.frames())).squaredNorm();
   }
-  const Eigen::MatrixXd directions = principal_directions(left, kEnough * kEnough * worn, kMostTurning);
+  const double unseen = kUnseen * (body.nodes.rowwise().maxCoeff() - body.nodes.rowwise().minCoeff()).maxCoeff();
+  const double enough = std::max(kEnough * kEnough * worn, unseen * unseen * static_cast<double>(samples * skin.count()));
+  const Eigen::MatrixXd directions = principal_directions(left, enough, kMostTurning);
   played.weights.resize(skin.weights().rows() + directions.cols(), skin.frames());
   played.weights.topRows(skin.weights().rows()) = skin.weights();
   for (Eigen::Index f = 0; f < skin.frames() && directions.cols() > 0; ++f)

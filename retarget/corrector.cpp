@@ -43,7 +43,7 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
 
 void Corrector::reset() {
   previous_.setZero();
-  touching_of_response_.clear();
+  has_response_ = false;
 }
 
 /// Adds th B phi for each muscle to its column of the response.
@@ -102,10 +102,10 @@ bool Corrector::factor_system(const physics::State& state, const ContactNow& con
 /// is kept for some, while the same points touch; a creature that fights a push needs it fresh. False where the system cannot be
 /// factored.
 bool Corrector::respond(const physics::State& state, const ContactNow& contact) {
-  const bool calm = momentum_error_ < options_.calm_error && contact.touching == touching_of_response_;
-  if (calm && ++response_age_ < options_.response_every) return true;
-  touching_of_response_.clear();
-  if (!factor_system(state, contact)) return false;
+  const bool keeps = has_response_ && momentum_error_ < options_.calm_error && contact.touching == touching_of_response_;
+  if (keeps && ++response_age_ < options_.response_every) return true;
+  has_response_ = factor_system(state, contact);
+  if (!has_response_) return false;
   touching_of_response_ = contact.touching;
   response_age_ = 0;
   response_.setZero(3 * scene_.body.node_count(), muscles_.fields.cols());
@@ -195,7 +195,10 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   const physics::Body& body = scene_.body;
   const Eigen::Index muscles = muscles_.fields.cols();
   forces_.set_activation(activation);
-  if (!respond(state, contact)) return 0;
+  if (!respond(state, contact)) {
+    previous_.setZero();  // nothing is added
+    return 0;
+  }
   find_free_deviation(state, reference);
 
   // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.

@@ -85,6 +85,7 @@ class Corrector {
   std::vector<std::vector<ElementFields>> element_fields_;  // of the elements of each block
   Eigen::MatrixXd response_;       // 3N x muscles: change of velocity by each
   Eigen::MatrixXd node_normal_;    // muscles x muscles: the response's own products, nodes weighted
+  bool has_response_ = false;
   std::vector<ContactState> touching_of_response_;
   int response_age_ = 0;
   double momentum_error_ = 0;      // at the last call, in speeds per sqrt(g L)

@@ -168,17 +168,43 @@ class FrameSolver {
   ceres::Solver::Options solver_options_;
 };
 
+/// By how much a move of the nodes changes the volume of the tets that it moves much, per volume.
+double volume_change(const ControlMesh& mesh, const Eigen::Matrix3Xd& move) {
+  const auto volume = [&](const Eigen::Matrix3Xd& places, Eigen::Index t) {
+    const Eigen::Vector4i tet = mesh.tets.col(t);
+    const Eigen::Vector3d a = places.col(tet[0]);
+    return (places.col(tet[1]) - a).cross(places.col(tet[2]) - a).dot(places.col(tet[3]) - a);
+  };
+  const Eigen::Matrix3Xd moved = mesh.nodes + move;
+  const double much = 0.1 * move.colwise().norm().maxCoeff();
+  double change = 0, whole = 0;
+  for (Eigen::Index t = 0; t < mesh.tets.cols(); ++t) {
+    const Eigen::Vector4i tet = mesh.tets.col(t);
+    if (move(Eigen::all, tet).colwise().norm().maxCoeff() < much) continue;
+    change += std::abs(volume(moved, t) - volume(mesh.nodes, t));
+    whole += volume(mesh.nodes, t);
+  }
+  return whole > 0 ? change / whole : 0;
+}
+
 /// What the morph targets make of the bind pose's nodes, frame by frame.
 class MorphedNodes {
  public:
-  MorphedNodes(const Character& character, const ControlMesh& mesh, const Embedding& skin_embedding, double least)
+  MorphedNodes(const Character& character, const ControlMesh& mesh, const Embedding& skin_embedding,
+               const CouplingOptions& options, double length)
       : nodes_(mesh.nodes), weights_(character.clip.morph_weights) {
     if (weights_.size() == 0) return;
     carried = carried_by_nodes(character.skin.morphs, mesh, skin_embedding);
-    double most = 0;
-    for (Eigen::Index f = 0; f < weights_.cols(); ++f)
-      most = std::max(most, (at(f) - nodes_).colwise().squaredNorm().maxCoeff());
-    if (std::sqrt(most) < least) carried.clear();
+    bool is_any_carried = false;
+    for (std::size_t k = 0; k < carried.size(); ++k) {
+      const Eigen::Matrix3Xd move = weights_.row(static_cast<Eigen::Index>(k)).cwiseAbs().maxCoeff() * carried[k];
+      const bool is_large = move.colwise().norm().maxCoeff() >= options.least_morph * length;
+      const bool keeps_volume = volume_change(mesh, move) <= options.most_volume_change;
+      if (is_large && !keeps_volume) left_large.push_back(character.skin.morphs[k].name);
+      if (!is_large || !keeps_volume) carried[k].setZero();
+      is_any_carried = is_any_carried || (is_large && keeps_volume);
+    }
+    if (!is_any_carried) carried.clear();
   }
 
   Eigen::Matrix3Xd at(Eigen::Index frame) const {
@@ -188,6 +214,7 @@ class MorphedNodes {
   }
 
   std::vector<Eigen::Matrix3Xd> carried;
+  std::vector<std::string> left_large;
 
  private:
   const Eigen::Matrix3Xd& nodes_;
@@ -207,6 +234,7 @@ std::string broken_rule(const CouplingOptions& options) {
   if (!(options.elasticity >= 0)) return "elasticity must be 0 or above";
   if (!(options.least_weight >= 0 && options.least_weight < 1)) return "least_weight must be from 0 to below 1";
   if (!(options.least_morph >= 0)) return "least_morph must be 0 or above";
+  if (!(options.most_volume_change >= 0)) return "most_volume_change must be 0 or above";
   if (options.max_iterations < 1) return "max_iterations must be 1 or more";
   if (options.threads < 1) return "threads must be 1 or more";
   return "";
@@ -224,7 +252,7 @@ CoupledMotion couple(const Character& character, const ControlMesh& mesh, const 
   for (std::size_t b = 0; b < to_bone.size(); ++b) to_bone[b] = skeleton.bind_pose[b].inverse();
   const Rig rig = hang_on_bones(mesh, options);
   const double length = (skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff()).maxCoeff();
-  MorphedNodes nodes(character, mesh, skin_embedding, options.least_morph * length);
+  MorphedNodes nodes(character, mesh, skin_embedding, options, length);
   std::vector<FrameError> errors(static_cast<std::size_t>(clip.frames()));
   auto solve_every = [&](int first, int step) {
     FrameSolver solver(mesh, rig, options);
@@ -252,6 +280,7 @@ CoupledMotion couple(const Character& character, const ControlMesh& mesh, const 
   solve_every(0, threads);
   for (std::thread& member : crew) member.join();
   coupled.node_morphs = std::move(nodes.carried);
+  coupled.left_large_morphs = std::move(nodes.left_large);
 
   double squared_sum = 0;
   for (int f = 0; f < clip.frames(); ++f) {

@@ -193,6 +193,10 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   result.skin_points = both;
   result.skin_points.frames = both.frames.bottomRows(3 * points);
   result.skin = skin_motion(character, loop, root, ground);
+  for (const std::string& name : coupled.left_large_morphs) {
+    result.warnings.push_back("morph target '" + name +
+                              "' is large and changes the body's volume: the skin wears it, but contact and balance know nothing of it");
+  }
   result.morphs = {left_by_nodes(character.skin.morphs, coupled.node_morphs, creature.skin),
                    closed_weights(character.clip.morph_weights, loop), loop.rate_hz, loop.loop};
   return result;

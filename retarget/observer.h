@@ -7,7 +7,7 @@
 
 namespace hydrostat::retarget {
 
-/// What stands between the body and who corrects it.
+/// What stands between the body and who corrects it. What touches the ground is felt at once and for sure.
 struct Observation {
   double noise_m = 0;  // [m] RMS of each coordinate of each node
   double delay_s = 0;  // [s], rounded to whole control steps

@@ -25,10 +25,11 @@ struct Gate {
   bool walks_on_legs;                   // all that touches the ground
 };
 constexpr Gate kGates[] = {
-    {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.85, 1.15, 0.04, 0, false},
+    {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.92, 1.08, 0.003, 0, false},
     {"boxdog_trot.fbx", "loop", true, 14.99, 0.01, 0.04, 0.92, 1.08, 0.003, 0, true},
     {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.25, true},
 };
+constexpr double kHeading = 0.3;  // [deg] a cycle
 // Of the inverse dynamics, on every sample.
 constexpr double kMiss = 3e-4, kRootResidual = 0.01, kSaturated = 0.05;
 
@@ -116,6 +117,7 @@ void expect_gate(const fs::path& creature, const Gate& gate) {
   EXPECT_GE(travel, gate.least_travel);
   EXPECT_LE(travel, gate.most_travel);
   EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), gate.drift);
+  EXPECT_LE(std::abs(run["heading_deg_per_cycle"].get<double>()), kHeading);
   const json body = json::parse(io::read_file(creature / "body.json"));
   ASSERT_FALSE(body.at("patches").empty());
   for (const json& patch : body["patches"]) EXPECT_EQ(patch.at("on_leg"), gate.walks_on_legs) << patch["name"];

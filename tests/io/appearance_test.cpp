@@ -291,9 +291,26 @@ TEST(Appearance, AFileOfItComesBackToTheBitAndNothingElseDoes) {
   put(directory.path / "light map.png", png());
   const Read got = read(strip_with_all().file(), directory.path);
   const std::string bytes = appearance_bytes(got.appearance);
-  EXPECT_EQ(appearance_bytes(parse_appearance(bytes, "appearance.bin", 6)), bytes);
+  Read again = got;
+  again.appearance = parse_appearance(bytes, "appearance.bin", 6);
+  EXPECT_EQ(appearance_bytes(again.appearance), bytes);
+  // What the file does not hold would be lost in what is drawn.
+  write(directory.path / "drawn.glb", got);
+  write(directory.path / "drawn_again.glb", again);
+  EXPECT_EQ(bytes_of(directory.path / "drawn_again.glb"), bytes_of(directory.path / "drawn.glb"));
   EXPECT_THROW(parse_appearance(bytes, "appearance.bin", 5), Error) << "of another skin";
   EXPECT_THROW(parse_appearance(bytes.substr(0, bytes.size() / 2), "appearance.bin", 6), Error);
+}
+
+TEST(Appearance, VertexColoursOfFbxComeAlong) {
+  Appearance looks;
+  const retarget::Character character = import_character(HYDROSTAT_TESTS "/fuzz/corpus/face.fbx", "", {}, nullptr, &looks);
+  ASSERT_EQ(looks.parts.size(), 1u);
+  ASSERT_EQ(looks.parts[0].colours.cols(), 6);
+  for (Eigen::Index d = 0; d < 6; ++d) {
+    const bool is_top = character.skin.vertices(1, looks.parts[0].vertices[d]) > 1.5;
+    EXPECT_LT((looks.parts[0].colours.col(d) - Eigen::Vector4d(1, is_top ? 0.5 : 1, 0.25, 1)).norm(), 1e-6);
+  }
 }
 
 TEST(ImageType, IsKnownOfWholeImagesAlone) {

@@ -216,7 +216,13 @@ TEST(Morphs, TheirFileComesBackToTheBitAndNothingElseDoes) {
   const Read got = read(MorphedStrip());
   const retarget::MovingMorphs morphs{got.character.skin.morphs, got.character.clip.morph_weights, 60, true};
   const std::string bytes = morphs_bytes(morphs);
-  EXPECT_EQ(morphs_bytes(parse_morphs(bytes, "morphs.bin", 6)), bytes);
+  const retarget::MovingMorphs again = parse_morphs(bytes, "morphs.bin", 6);
+  EXPECT_EQ(morphs_bytes(again), bytes);
+  EXPECT_EQ(again.targets[1].name, "wink");
+  EXPECT_EQ(again.targets[0].vertices, morphs.targets[0].vertices);
+  EXPECT_EQ(again.targets[0].offsets, morphs.targets[0].offsets);
+  EXPECT_EQ(again.weights, morphs.weights);
+  EXPECT_TRUE(again.loop && again.rate_hz == 60);
   EXPECT_THROW(parse_morphs(bytes, "morphs.bin", 5), Error) << "of another skin";
   EXPECT_THROW(parse_morphs(bytes.substr(0, bytes.size() / 2), "morphs.bin", 6), Error);
 }

@@ -115,8 +115,9 @@ TEST(Coupling, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
-/// The worm with one morph target that swells its middle third by `size` [m]; no weight in the first frame, all in the second.
-Character swelling_worm(double size) {
+/// The worm with one morph target of its middle third, which swells or goes aside by `size` [m]; no weight in the first frame,
+/// all in the second.
+Character morphing_worm(double size, bool swells) {
   Character character = worm();
   character.clip = clip_of({character.skeleton.bind_pose, character.skeleton.bind_pose});
   const auto& vertices = character.skin.vertices;
@@ -127,15 +128,18 @@ Character swelling_worm(double size) {
   }
   MorphTarget swell{"swell", Eigen::Map<const Eigen::VectorXi>(moved.data(), static_cast<Eigen::Index>(moved.size())), {}};
   swell.offsets = vertices(Eigen::all, moved).colwise() - middle;
-  swell.offsets.row(2).setZero();
-  swell.offsets = size * swell.offsets.colwise().normalized();
+  for (auto offset : swell.offsets.colwise()) {
+    const double window = std::pow(std::cos(M_PI / 2 * offset.z() / 0.1), 2);
+    offset.z() = 0;
+    offset = size * window * (swells ? Eigen::Vector3d(offset.normalized()) : Eigen::Vector3d(Eigen::Vector3d::UnitX()));
+  }
   character.skin.morphs = {swell};
   character.clip.morph_weights = Eigen::RowVector2d(0, 1);
   return character;
 }
 
-TEST(Coupling, LargeMorphTargetsMoveTheBodySmallOnesAreLeftToBeWornAndNothingIsLost) {
-  Character character = swelling_worm(0.03);
+TEST(Coupling, LargeMorphTargetsMoveTheBodyOthersAreLeftToBeWornAndNothingIsLost) {
+  Character character = morphing_worm(0.03, false);
   const Setting body = body_of(character);
   const CoupledMotion coupled = couple(character, body.mesh, body.skin_embedding);
   ASSERT_EQ(coupled.node_morphs.size(), 1u);
@@ -149,13 +153,19 @@ TEST(Coupling, LargeMorphTargetsMoveTheBodySmallOnesAreLeftToBeWornAndNothingIsL
   const Eigen::Matrix3Xd miss = embedded_positions(body.skin_embedding, body.mesh.nodes) - character.skin.vertices;
   EXPECT_LT((both - miss - whole).cwiseAbs().maxCoeff(), 1e-4);
 
-  character = swelling_worm(0.004);
-  const CoupledMotion small = couple(character, body.mesh, body.skin_embedding);
-  EXPECT_TRUE(small.node_morphs.empty());
-  EXPECT_EQ(small.motion.at(1), small.motion.at(0));
-  EXPECT_LT(small.error_max_length, 0.004) << "what is worn over the body is no error of it";
-  EXPECT_EQ(left_by_nodes(character.skin.morphs, small.node_morphs, body.skin_embedding)[0].offsets,
-            character.skin.morphs[0].offsets);
+  EXPECT_TRUE(coupled.left_large_morphs.empty());
+
+  for (const bool swells : {false, true}) {
+    SCOPED_TRACE(swells ? "large, and changes the volume" : "small");
+    character = morphing_worm(swells ? 0.03 : 0.004, swells);
+    const CoupledMotion worn = couple(character, body.mesh, body.skin_embedding);
+    EXPECT_TRUE(worn.node_morphs.empty());
+    EXPECT_EQ(worn.left_large_morphs.size(), swells ? 1u : 0u);
+    EXPECT_EQ(worn.motion.at(1), worn.motion.at(0));
+    EXPECT_LT(worn.error_max_length, 0.004) << "what is worn over the body is no error of it";
+    EXPECT_EQ(left_by_nodes(character.skin.morphs, worn.node_morphs, body.skin_embedding)[0].offsets,
+              character.skin.morphs[0].offsets);
+  }
 }
 
 TEST(MovingMorphs, ALoopKeepsItsPhaseAndClosesAndAOneShotHoldsItsLast) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "io/load_creature.h"
+#include "retarget/level_cost.h"
 
 namespace hydrostat::cli {
 

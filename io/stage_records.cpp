@@ -324,7 +324,9 @@ retarget::Rig parse_rig(const std::string& bytes, const std::string& file, Eigen
               rig.skin.triangles.size() > 0 && rig.skin.triangles.minCoeff() >= 0 &&
               rig.skin.triangles.maxCoeff() < vertices &&
               static_cast<Eigen::Index>(rig.skeleton.parents.size()) == bones &&
-              static_cast<Eigen::Index>(rig.skeleton.bind_pose.size()) == bones;
+              static_cast<Eigen::Index>(rig.skeleton.bind_pose.size()) == bones &&
+              static_cast<Eigen::Index>(rig.skeleton.weighted.size()) == bones &&
+              static_cast<Eigen::Index>(rig.skin.skin_weights.size()) == vertices;
   for (std::size_t b = 0; fits && b < rig.skeleton.parents.size(); ++b)
     fits = rig.skeleton.parents[b] >= -1 && rig.skeleton.parents[b] < static_cast<int>(b);
   for (std::size_t v = 0; fits && v < rig.skin.skin_weights.size(); ++v) {

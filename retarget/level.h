@@ -24,32 +24,14 @@ struct Level {
 ///
 /// The target's skin is what the creature and its level have in common: nodes go where the skin, and what lies inside both
 /// bodies, is as in the target, with as little change of the deformation from tet to tet as that leaves open. Of the signals
-/// what is carried over is the activations' squared stretch less the target's own, which is what bears the load: a field of
-/// symmetric tensors, linear in the tets, that fits the solved constraints best; a constraint of the level has it along its
-/// direction, and its own target's stretch. So a uniform strain is carried over exactly, whatever both meshes are. Muscles
+/// what is carried over is the activations' squared stretch (of elements: its logarithm) less the target's own, which is what bears
+/// the load: a field of symmetric tensors, linear in the tets, that fits the solved constraints best; a constraint of the level has
+/// it along its direction, and its own target's stretch. So a uniform strain is carried over exactly, whatever both meshes are. Muscles
 /// are made anew, for they are fields over the rest body; patches keep what they do by the bones they belong to; layers of
 /// edits lie over the new channels as they did over the old.
 Level at_level(const Performer& solved, const SignalSet& signals, const Rig& rig, const CreatureOptions& options);
 
-/// What a level costs, before anything is carried over to it.
-struct LevelCost {
-  int wished = 0;  // nodes, as CreatureOptions has them; 0: the solved creature itself
-  int nodes = 0;
-  double work_ms = 0;  // counted, of solver and corrector, a frame of 1/60 s
-};
-
-/// Counted work [ms] of solver and corrector for a frame of 1/60 s, by a tenth of a second in which the body settles at
-/// rest: the same on every machine.
-double frame_work_ms(const physics::Scene& scene, Eigen::Index muscles, const ReplayOptions& options);
-
-/// Of levels of four, two, one, a half and a quarter of the creature's number of nodes, the finest first.
-std::vector<LevelCost> level_costs(const Performer& solved, const Rig& rig, const CreatureOptions& options,
-                                   const ReplayOptions& replay);
-
-/// A field of symmetric tensors, one column of six (xx yy zz xy yz xz) a node, by its values along constraints: values E x
-/// S, each the field's mean at both ends along the constraint. The smoothest of those that fit.
-Eigen::MatrixXd tensors_along(const Eigen::Ref<const Eigen::Matrix3Xd>& rest,
-                              const Eigen::Ref<const Eigen::Matrix2Xi>& edges,
-                              const Eigen::Ref<const Eigen::MatrixXd>& values);
+/// The character's body on a mesh of `nodes` wished nodes, as large as it is in the rig.
+Creature level_body(const Rig& rig, const CreatureOptions& options, int nodes);
 
 }  // namespace hydrostat::retarget

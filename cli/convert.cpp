@@ -305,46 +305,58 @@ class Conversion {
 
   void let_go() {
     perform();
-    if (chosen_) calm();
-    while (chosen_ && is_down(performances_.main()) &&
+    while (chosen_ && is_down(performances_.main()) && !calm() &&
            take_next(*chosen_, target_.performer, whole_signals_, target_.report.warnings)) {
       signals_ = whole_signals_;
       tell_signals();
       perform();
-      calm();
     }
-  }
-
-  /// Feedback that a coarse body stands: where it falls, effort gets dearer. What no effort holds up falls on the usual one.
-  void calm() {
-    for (const double factor : {4.0, 16.0, 64.0, 1.0}) {
-      if (!is_down(performances_.main())) break;
-      effort_ = factor;
-      perform();
-    }
-    if (effort_ == 1) return;
-    target_.report.warnings.push_back("feedback: it keeps up only where effort is " +
-                                      std::to_string(std::lround(effort_)) + " times as dear as usual");
-  }
-
-  void perform() {
-    retarget::PerformOptions perform_options;
-    perform_options.replay.method = settings_.method;
-    if (chosen_) take_steps(perform_options.replay, chosen_->setting);
-    perform_options.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
-    perform_options.seed = options_.seed;
-    perform_options.threads = options_.threads;
-    key_ = key_after(key_, signals_text_, physics::name_of(perform_options.replay.method), std::int64_t{options_.seed});
-    if (chosen_) key_ = key_after(key_, perform_options.replay.step_s);
-    if (effort_ != 1) key_ = key_after(key_, effort_);
-    perform_options.replay.corrector.effort *= effort_;
-    performances_ = stages_.run("replay", key_, [&] { return retarget::perform(target_.performer, signals_, perform_options); });
     if (chosen_) target_.report.accuracy = told(*chosen_);
     report_replays(performances_, target_.report);
     stages_.run("measurement", [&] {
-      measure(target_.performer, signals_, perform_options, target_.report);
+      measure(target_.performer, signals_, perform_options(), target_.report);
       return 0;
     });
+  }
+
+  /// Feedback that a coarse body stands: effort gets dearer. False: no effort holds it up, and the usual one's fall is told.
+  bool calm() {
+    const retarget::Performances usual = performances_;
+    const std::string key = key_;
+    for (const double factor : {4.0, 16.0, 64.0}) {
+      effort_ = factor;
+      perform();
+      if (is_down(performances_.main())) continue;
+      performances_.naive = usual.naive;
+      performances_.open_loop = usual.open_loop;
+      target_.report.warnings.push_back("feedback: it keeps up only where effort is " + std::to_string(std::lround(factor)) +
+                                        " times as dear as usual");
+      return true;
+    }
+    effort_ = 1;
+    performances_ = usual;
+    key_ = key;
+    return false;
+  }
+
+  retarget::PerformOptions perform_options() const {
+    retarget::PerformOptions result;
+    result.replay.method = settings_.method;
+    if (chosen_) take_steps(result.replay, chosen_->setting);
+    result.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
+    result.replay.corrector.effort *= effort_;
+    result.baselines = effort_ == 1;  // else they are there
+    result.seed = options_.seed;
+    result.threads = options_.threads;
+    return result;
+  }
+
+  void perform() {
+    const retarget::PerformOptions options = perform_options();
+    key_ = key_after(key_, signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
+    if (chosen_) key_ = key_after(key_, options.replay.step_s);
+    if (effort_ != 1) key_ = key_after(key_, effort_);
+    performances_ = stages_.run("replay", key_, [&] { return retarget::perform(target_.performer, signals_, options); });
   }
 
   void write() {

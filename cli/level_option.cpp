@@ -1,5 +1,6 @@
 #include "cli/level_option.h"
 
+#include <cmath>
 #include <cstdio>
 
 #include "cli/number_option.h"
@@ -41,8 +42,12 @@ std::vector<retarget::LevelCost> levels_within(const AskedLevel& asked, const st
       throw UsageError(command, "option --budget", "is for --lod auto, and --lod tells a number of nodes",
                        "Leave one of them out.");
     }
+    const double nodes = parse_number(asked.lod, kFewest, kMost, command, "--lod");
+    if (nodes != std::floor(nodes)) {
+      throw UsageError(command, "option --lod", "'" + asked.lod + "' is no whole number", "Nodes come whole.");
+    }
     retarget::LevelCost cost;
-    cost.wished = static_cast<int>(parse_number(asked.lod, kFewest, kMost, command, "--lod"));
+    cost.wished = static_cast<int>(nodes);
     return {cost};
   }
   if (budget == 0) {

@@ -159,7 +159,7 @@ TEST(TensorField, ThatIsTheSameEverywhereIsFoundAndGoesToAnotherMesh) {
 TEST(AtLevel, CarriesAUniformStrainExactly) {
   Eigen::Matrix3d deform;
   deform << 1.15, 0.05, 0, 0, 1 / std::sqrt(1.15), 0.08, 0, 0, 1 / std::sqrt(1.15);
-  const std::array<std::pair<int, bool>, 3> cases{{{40, false}, {200, false}, {40, true}}};
+  const std::array<std::pair<int, bool>, 2> cases{{{200, false}, {40, true}}};
   for (const auto& [nodes, hexahedra] : cases) {
     const Solved solved = floating_block(90, deform, hexahedra);
     const Level level = at_level(solved.performer, solved.signals, solved.rig, options_for(nodes, hexahedra));
@@ -212,7 +212,7 @@ TEST(CountedWork, OfCorrectionsGrowsWithTheNodesAsTheirTimeDoes) {
   double counted[2], measured[2];
   for (const int k : {0, 1}) {
     CreatureOptions options;
-    options.nodes = k == 0 ? 60 : 300;
+    options.nodes = k == 0 ? 60 : 200;
     const Creature creature = make_creature(worm(), options);
     const physics::Scene& scene = creature.scene;
     const Muscles muscles = make_muscles(scene.body, creature.character.skeleton, creature.mesh.bone_weights);

@@ -47,7 +47,7 @@ std::vector<retarget::LevelCost> levels_within(const AskedLevel& asked, const st
       throw UsageError(command, "option --lod", "'" + asked.lod + "' is no whole number", "Nodes come whole.");
     }
     retarget::LevelCost cost;
-    cost.wished = static_cast<int>(nodes);
+    if (nodes != performer.mesh.node_count()) cost.wished = static_cast<int>(nodes);  // else the creature itself
     return {cost};
   }
   if (budget == 0) {

@@ -37,10 +37,12 @@ Influences in_a_row(const retarget::SkinnedMesh& skin) {
   return row;
 }
 
+/// Throws std::out_of_range for influences on vertices that there are not.
 void hand_out(const Influences& row, retarget::SkinnedMesh& skin) {
+  if (row.places.rows() != 2 || row.places.cols() != row.weights.size()) throw std::out_of_range("influences");
   skin.skin_weights.assign(static_cast<std::size_t>(skin.vertices.cols()), {});
   for (Eigen::Index i = 0; i < row.weights.size(); ++i)
-    skin.skin_weights[static_cast<std::size_t>(row.places(0, i))].push_back({row.places(1, i), row.weights[i]});
+    skin.skin_weights.at(static_cast<std::size_t>(row.places(0, i))).push_back({row.places(1, i), row.weights[i]});
 }
 
 }  // namespace
@@ -325,8 +327,7 @@ retarget::Rig parse_rig(const std::string& bytes, const std::string& file, Eigen
               rig.skin.triangles.maxCoeff() < vertices &&
               static_cast<Eigen::Index>(rig.skeleton.parents.size()) == bones &&
               static_cast<Eigen::Index>(rig.skeleton.bind_pose.size()) == bones &&
-              static_cast<Eigen::Index>(rig.skeleton.weighted.size()) == bones &&
-              static_cast<Eigen::Index>(rig.skin.skin_weights.size()) == vertices;
+              static_cast<Eigen::Index>(rig.skeleton.weighted.size()) == bones;
   for (std::size_t b = 0; fits && b < rig.skeleton.parents.size(); ++b)
     fits = rig.skeleton.parents[b] >= -1 && rig.skeleton.parents[b] < static_cast<int>(b);
   for (std::size_t v = 0; fits && v < rig.skin.skin_weights.size(); ++v) {

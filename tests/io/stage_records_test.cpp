@@ -92,15 +92,15 @@ TEST(RigFile, ComesBackWholeOrNotAtAll) {
     EXPECT_THROW(parse_rig(damaged, "rig.bin", nodes, vertices), Error);
     EXPECT_THROW(parse_rig(bytes.substr(0, place), "rig.bin", nodes, vertices), Error);
   }
-  const auto refused = [&](const auto& spoil) {
+  const auto refused = [&](const char* what, const auto& spoil) {
     retarget::Rig spoilt = rig;
     spoil(spoilt);
-    EXPECT_THROW(parse_rig(rig_bytes(spoilt), "rig.bin", nodes, vertices), Error);
+    EXPECT_THROW(parse_rig(rig_bytes(spoilt), "rig.bin", nodes, vertices), Error) << what;
   };
-  refused([](retarget::Rig& spoilt) { spoilt.skeleton.parents[0] = 1; });
-  refused([](retarget::Rig& spoilt) { spoilt.skin.triangles(0, 0) = -1; });
-  refused([](retarget::Rig& spoilt) { spoilt.skin.skin_weights[0][0].bone = 99; });
-  refused([](retarget::Rig& spoilt) { spoilt.skin.skin_weights.pop_back(); });
+  refused("parents", [](retarget::Rig& spoilt) { spoilt.skeleton.parents[0] = 1; });
+  refused("triangles", [](retarget::Rig& spoilt) { spoilt.skin.triangles(0, 0) = -1; });
+  refused("bone", [](retarget::Rig& spoilt) { spoilt.skin.skin_weights[0][0].bone = 99; });
+  refused("vertex", [](retarget::Rig& spoilt) { spoilt.skin.skin_weights.push_back({{0, 1.0}}); });
 }
 
 }  // namespace

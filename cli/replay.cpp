@@ -163,6 +163,18 @@ void tell_level(const std::optional<retarget::LevelReport>& level, const std::st
   std::cout << where << text;
 }
 
+/// A level may stay up and yet not get on.
+void warn_of_lost_way(const retarget::Replay& run, std::vector<std::string>& warnings) {
+  constexpr double kLost = 0.2, kLeastTravel = 0.01;  // of the clip's travel; of L a cycle
+  const retarget::ReplayReport& report = run.report;
+  const double wanted = report.clip_travel_per_cycle_length;
+  if (is_down(run) || wanted < kLeastTravel || report.travel_per_cycle_length >= (1 - kLost) * wanted) return;
+  char text[120];
+  std::snprintf(text, sizeof text, "level: the creature stays up, but makes %.0f %% of the clip's way: a finer level keeps it better",
+                100 * report.travel_per_cycle_length / wanted);
+  warnings.emplace_back(text);
+}
+
 int replay(const ReplayCommand& command) {
   if (!command.out.empty() && fs::path(command.out).extension() != ".glb") {
     throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
@@ -202,6 +214,7 @@ int replay(const ReplayCommand& command) {
     take_steps(options.replay, chosen->setting);
     performances = perform();
   }
+  if (command.level.is_asked()) warn_of_lost_way(performances.main(), creature.target.report.warnings);
   if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
   const bool is_met = !chosen || chosen->report.is_met();
   if (!command.json) tell_level(creature.target.report.level, command.directory);

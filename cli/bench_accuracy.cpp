@@ -29,6 +29,9 @@ constexpr double kParts[] = {0.25, 0.5, 1, 2};  // of the scene's number of node
 constexpr double kFinest = 4;                   // the reference's
 constexpr double kFinerMesh = 1.7;    // what is left of a mesh's error over its change from half the nodes, of second order
 constexpr double kUsualError = 0.01;  // per L
+constexpr double kLevels[] = {0.25, 0.5, 1, 2, 4};     // of a creature's nodes
+constexpr int kFewestNodes = 20;                       // of a level
+constexpr double kBriefly = 4;                         // [s] for which a level has to stay up
 constexpr double kHarmonics[] = {1, 0.75, 0.5, 0.25};  // of a creature's
 
 struct AccuracyCommand {
@@ -177,6 +180,42 @@ class Bench {
         }
       }
     }
+    const bool has_rig = fs::exists(fs::path(command_.subject) / "rig.bin");  // an older one has none
+    if (!command_.own_mesh && has_rig) of_levels(creature, reference);
+  }
+
+  /// The creature by its own method and step on coarser and finer meshes, and on its own; one whose closed loop falls where
+  /// the creature's does not is told so.
+  void of_levels(const io::LoadedCreature& creature, const retarget::ReferenceOf<3>& reference) {
+    const retarget::Rig rig = io::load_rig(command_.subject, creature);
+    const retarget::Performer& solved = creature.target.performer;
+    retarget::ReplayOptions replay;
+    replay.method =
+        physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
+    take_steps(replay, {replay.method, io::setting(creature.record, "step_s", replay.step_s)});
+    for (const double part : kLevels) {
+      const int wished = static_cast<int>(std::lround(part * solved.mesh.node_count()));
+      if (wished < kFewestNodes) continue;
+      progress_.begin("level of " + std::to_string(wished) + " nodes");
+      retarget::CreatureOptions options = io::level_options(creature);
+      options.nodes = wished;
+      const retarget::Level level =
+          part == 1 ? retarget::Level{solved, creature.signals} : retarget::at_level(solved, creature.signals, rig, options);
+      if (part != 1 && level.performer.mesh.node_count() == solved.mesh.node_count()) continue;  // its lattice is the creature's
+      retarget::AccuracyRow row =
+          retarget::measure_level(reference, level.performer, level.signals, {replay.method, replay.step_s});
+      row.harmonics = level.signals.activation.harmonics();
+      retarget::PerformOptions brief;
+      brief.baselines = false;
+      brief.replay = replay;
+      brief.replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);
+      brief.replay.duration_s = std::min(kBriefly, retarget::usual_duration(solved.prepared.target));
+      double effort = 1;
+      const retarget::Performances runs = retarget::perform_calmly(level.performer, level.signals, brief, effort);
+      row.falls = runs.main().report.fell || runs.main().termination != physics::Termination::kDone;
+      row.stable = row.stable && !row.falls;
+      curve_.rows.push_back(row);
+    }
   }
 
   template <int Dim>
@@ -247,7 +286,7 @@ void add_bench_accuracy(CLI::App& bench, int& exit_code) {
   sub->add_option("--max-error", command->max_error, "The error, 1% or 0.01 of L, within which the cheapest is marked [1%]");
   sub->add_option("--duration", command->duration, "Seconds of the motion that are compared, at most [1]")
       ->check(number_within(0.1, 60));
-  sub->add_flag("--own-mesh", command->own_mesh, "Only the scene's own mesh: errors are those of methods and steps alone");
+  sub->add_flag("--own-mesh", command->own_mesh, "Only the scene's or creature's own mesh: errors are those of methods and steps alone");
   sub->add_flag("--json", command->json, "Print what was found as JSON");
   sub->add_flag("--quiet", command->quiet, "No progress");
   sub->callback([command, &exit_code] { exit_code = accuracy(*command); });

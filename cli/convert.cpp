@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -94,7 +95,7 @@ std::string key_of(const io::ImportedCharacter& imported) {
 
 /// Wished where --nodes is not told: most of a conversion's time goes with them. 0: what fits the body.
 int nodes_for(const std::string& grade) {
-  constexpr int kDraft = 60, kFinal = 400;
+  constexpr int kDraft = 100, kFinal = 400;
   if (grade == "draft") return kDraft;
   return grade == "final" ? kFinal : 0;
 }
@@ -166,7 +167,7 @@ retarget::BodyReport body_report(const retarget::Creature& creature) {
 }
 
 io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
-                                   const std::optional<ChosenStep>& chosen) {
+                                   const std::optional<ChosenStep>& chosen, double effort) {
   io::CreatureRecord record;
   record.source_file = fs::absolute(options.clip_file).string();
   record.source_sha256 = report.source.sha256;
@@ -188,6 +189,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   if (!options.import.up.empty()) record.settings.emplace_back("up", options.import.up);
   if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
   if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
+  if (effort != 1) record.settings.emplace_back("corrector_effort", effort);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
 }
@@ -303,41 +305,70 @@ class Conversion {
 
   void let_go() {
     perform();
-    while (chosen_ && is_down(performances_.main()) &&
+    while (chosen_ && is_down(performances_.main()) && !calm() &&
            take_next(*chosen_, target_.performer, whole_signals_, target_.report.warnings)) {
       signals_ = whole_signals_;
       tell_signals();
       perform();
     }
-  }
-
-  void perform() {
-    retarget::PerformOptions perform_options;
-    perform_options.replay.method = settings_.method;
-    if (chosen_) take_steps(perform_options.replay, chosen_->setting);
-    perform_options.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
-    perform_options.seed = options_.seed;
-    perform_options.threads = options_.threads;
-    key_ = key_after(key_, signals_text_, physics::name_of(perform_options.replay.method), std::int64_t{options_.seed});
-    if (chosen_) key_ = key_after(key_, perform_options.replay.step_s);
-    performances_ = stages_.run("replay", key_, [&] { return retarget::perform(target_.performer, signals_, perform_options); });
     if (chosen_) target_.report.accuracy = told(*chosen_);
     report_replays(performances_, target_.report);
     stages_.run("measurement", [&] {
-      measure(target_.performer, signals_, perform_options, target_.report);
+      measure(target_.performer, signals_, perform_options(), target_.report);
       return 0;
     });
+  }
+
+  /// Feedback that a coarse body stands: effort gets dearer. False: no effort holds it up, and the usual one's fall is told.
+  bool calm() {
+    const retarget::Performances usual = performances_;
+    const std::string key = key_;
+    for (const double factor : {4.0, 16.0, 64.0}) {
+      effort_ = factor;
+      perform();
+      if (is_down(performances_.main())) continue;
+      performances_.naive = usual.naive;
+      performances_.open_loop = usual.open_loop;
+      target_.report.warnings.push_back("feedback: it keeps up only where effort is " + std::to_string(std::lround(factor)) +
+                                        " times as dear as usual");
+      return true;
+    }
+    effort_ = 1;
+    performances_ = usual;
+    key_ = key;
+    return false;
+  }
+
+  retarget::PerformOptions perform_options() const {
+    retarget::PerformOptions result;
+    result.replay.method = settings_.method;
+    if (chosen_) take_steps(result.replay, chosen_->setting);
+    result.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
+    result.replay.corrector.effort *= effort_;
+    result.baselines = effort_ == 1;  // else they are there
+    result.seed = options_.seed;
+    result.threads = options_.threads;
+    return result;
+  }
+
+  void perform() {
+    const retarget::PerformOptions options = perform_options();
+    key_ = key_after(key_, signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
+    if (chosen_) key_ = key_after(key_, options.replay.step_s);
+    if (effort_ != 1) key_ = key_after(key_, effort_);
+    performances_ = stages_.run("replay", key_, [&] { return retarget::perform(target_.performer, signals_, options); });
   }
 
   void write() {
     const retarget::Performer& performer = target_.performer;
     stages_.run("files", [&] {
-      writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_)));
+      writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, effort_)));
       writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                                dominant_bones_of_nodes(creature_.mesh.bone_weights)));
       writer_.write("target.bin", target_file_);
       if (!performer.morphs.targets.empty()) writer_.write("morphs.bin", io::morphs_bytes(performer.morphs));
       if (!appearance_.parts.empty()) writer_.write("appearance.bin", io::appearance_bytes(appearance_));
+      writer_.write("rig.bin", io::rig_bytes({creature_.character.skeleton, creature_.character.skin, creature_.mesh.bone_weights}));
       writer_.write("signals.json", signals_text_);
       io::write_skinned_glb(writer_.directory() / "reference.glb",
                             {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance_,
@@ -360,6 +391,7 @@ class Conversion {
   io::PerformedTarget target_;
   retarget::SignalSet signals_, whole_signals_;  // the latter before an accuracy cut them
   std::optional<ChosenStep> chosen_;
+  double effort_ = 1;  // of the corrector, over the usual one
   retarget::Performances performances_;
   io::Appearance appearance_;
   std::string target_file_, signals_text_;

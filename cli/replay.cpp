@@ -8,6 +8,7 @@
 
 #include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
+#include "cli/level_option.h"
 #include "cli/number_option.h"
 #include "cli/outcome.h"
 #include "cli/stages.h"
@@ -28,6 +29,7 @@ constexpr double kFastestPush = 100;   // [m/s] along an axis
 struct ReplayCommand {
   std::string directory, out, trace;
   AskedAccuracy accuracy;
+  AskedLevel level;
   double duration = 0, cycles = 0, trace_rate = 0;
   bool open_loop = false, json = false, quiet = false;
   std::vector<std::string> pushes;
@@ -82,6 +84,7 @@ retarget::PerformOptions perform_options(const ReplayCommand& command, const io:
   retarget::PerformOptions options;
   options.replay.method = physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
   take_steps(options.replay, {options.replay.method, io::setting(creature.record, "step_s", options.replay.step_s)});
+  options.replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);
   options.replay.duration_s = command.duration > 0  ? command.duration
                               : command.cycles > 0 ? command.cycles * target.duration_s()
                                                    : retarget::usual_duration(target);
@@ -107,6 +110,71 @@ int write_motion(const ReplayCommand& command, const retarget::Performer& perfor
   return tell_run(run, command.directory, file.string());
 }
 
+/// The levels that were asked for, one after the other in the creature's place; none where none were.
+class Levels {
+ public:
+  Levels(const ReplayCommand& command, io::LoadedCreature& creature, const retarget::ReplayOptions& options, Stages& stages)
+      : command_(command), stages_(stages) {
+    if (!command.level.is_asked()) return;
+    solved_ = creature;
+    rig_ = io::load_rig(command.directory, creature);
+    levels_ = stages.run("levels", [&] { return levels_within(command.level, kCommand, creature, rig_, options); });
+    if (levels_.front().work_ms == 0) options_ = options;
+    take(creature);
+  }
+  /// The next coarser one, with a word on the fall of this one; false where there is none.
+  bool take_next(io::LoadedCreature& creature) {
+    if (taken_ + 1 >= levels_.size()) return false;
+    fallen_.push_back("level: on " + std::to_string(levels_[taken_].nodes) +
+                      " nodes, which the budget allows, the creature fell");
+    ++taken_;
+    take(creature);
+    std::vector<std::string>& warnings = creature.target.report.warnings;
+    warnings.insert(warnings.end(), fallen_.begin(), fallen_.end());
+    return true;
+  }
+
+ private:
+  void take(io::LoadedCreature& creature) {
+    creature = stages_.run("level", [&] { return at_level(solved_, rig_, levels_[taken_], command_.level, kCommand); });
+    retarget::LevelReport& report = *creature.target.report.level;
+    if (options_) {
+      const retarget::Performer& performer = creature.target.performer;
+      report.work_ms = retarget::frame_work_ms(performer.scene, performer.muscles.fields.cols(), *options_);
+    }
+  }
+
+  const ReplayCommand& command_;
+  Stages& stages_;
+  io::LoadedCreature solved_;
+  retarget::Rig rig_;
+  std::vector<retarget::LevelCost> levels_;
+  std::optional<retarget::ReplayOptions> options_;  // where the cost is not known yet
+  std::size_t taken_ = 0;
+  std::vector<std::string> fallen_;
+};
+
+/// What a person is told of the level, before the replay's own line.
+void tell_level(const std::optional<retarget::LevelReport>& level, const std::string& where) {
+  if (!level) return;
+  char text[160];
+  std::snprintf(text, sizeof text, ": on %d nodes (solved on %d), %.3g ms of counted work a frame of 1/60 s\n", level->nodes,
+                level->solved_nodes, level->work_ms);
+  std::cout << where << text;
+}
+
+/// A level may stay up and yet not get on.
+void warn_of_lost_way(const retarget::Replay& run, std::vector<std::string>& warnings) {
+  constexpr double kLost = 0.2, kLeastTravel = 0.01;  // of the clip's travel; of L a cycle
+  const retarget::ReplayReport& report = run.report;
+  const double wanted = report.clip_travel_per_cycle_length;
+  if (is_down(run) || wanted < kLeastTravel || report.travel_per_cycle_length >= (1 - kLost) * wanted) return;
+  char text[120];
+  std::snprintf(text, sizeof text, "level: the creature stays up, but makes %.0f %% of the clip's way: a finer level keeps it better",
+                100 * report.travel_per_cycle_length / wanted);
+  warnings.emplace_back(text);
+}
+
 int replay(const ReplayCommand& command) {
   if (!command.out.empty() && fs::path(command.out).extension() != ".glb") {
     throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
@@ -117,6 +185,7 @@ int replay(const ReplayCommand& command) {
   io::LoadedCreature creature = stages.run("load", [&] { return io::load_creature(command.directory); });
   const retarget::Performer& performer = creature.target.performer;
   retarget::PerformOptions options = perform_options(command, creature);
+  Levels levels(command, creature, options.replay, stages);
   std::optional<ChosenStep> chosen;
   if (command.accuracy.is_asked()) {
     chosen = stages.run("accuracy", [&] { return choose_step(command.accuracy, kCommand, performer, creature.signals, std::nullopt); });
@@ -126,16 +195,29 @@ int replay(const ReplayCommand& command) {
   if (command.out.empty()) writer.emplace(command.directory, io::CreatureWriter::Start::amended);
 
   const auto perform = [&] {
-    return stages.run("replay", [&] { return retarget::perform(performer, creature.signals, options); });
+    return stages.run("replay", [&] {
+      if (!command.level.is_asked()) return retarget::perform(performer, creature.signals, options);
+      double effort = 1;
+      retarget::Performances runs = retarget::perform_calmly(performer, creature.signals, options, effort);
+      options.replay.corrector.effort *= effort;
+      if (effort > 1) {
+        creature.target.report.warnings.push_back("level: it keeps up only on feedback whose effort is " +
+                                                  std::to_string(std::lround(effort)) + " times as dear as usual");
+      }
+      return runs;
+    });
   };
   retarget::Performances performances = perform();
+  while (is_down(performances.main()) && levels.take_next(creature)) performances = perform();
   while (chosen && !command.open_loop && is_down(performances.main()) &&
          take_next(*chosen, performer, creature.signals, creature.target.report.warnings)) {
     take_steps(options.replay, chosen->setting);
     performances = perform();
   }
+  if (command.level.is_asked()) warn_of_lost_way(performances.main(), creature.target.report.warnings);
   if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
   const bool is_met = !chosen || chosen->report.is_met();
+  if (!command.json) tell_level(creature.target.report.level, command.directory);
   if (!writer) {
     const int exit_code = write_motion(command, performer, creature.appearance, performances);
     if (is_met || exit_code != kDone) return exit_code;
@@ -186,6 +268,10 @@ void add_replay(CLI::App& app, int& exit_code) {
                                                         "change its velocity by dv [m/s]; may be given several times")
       ->allow_extra_args(false);
   add_accuracy_options(*replay_command, command->accuracy);
+  add_level_options(*replay_command, command->level);
+  for (const char* other : {"--max-error", "--accuracy"}) {
+    replay_command->get_option("--lod")->excludes(replay_command->get_option(other));
+  }
   CLI::Option* seed = replay_command->add_option("--seed", command->seed, "See 'hydrostat convert --help' [the creature's]");
   CLI::Option* trace = replay_command->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
   replay_command->add_option("--trace-rate", command->trace_rate, "Rows a second, a whole part of the 120 of the control")

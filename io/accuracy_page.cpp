@@ -95,7 +95,7 @@ std::string table(const AccuracyCurve& curve, const std::vector<bool>& front) {
                                100 * row.volume_error, row.momentum_error, row.angular_error}) {
       html += "<td>" + (std::isfinite(value) ? short_number(value) : std::string("-"));
     }
-    html += std::string("<td>") + (row.stable ? "yes" : "no") + "<td>" + (front[k] ? "yes" : "") + "</tr>\n";
+    html += std::string("<td>") + (row.falls ? "falls" : row.stable ? "yes" : "no") + "<td>" + (front[k] ? "yes" : "") + "</tr>\n";
   }
   return html + "</table>\n";
 }
@@ -124,7 +124,7 @@ namespace {
 std::string diagram(const AccuracyCurve& curve, bool has_links) {
   Axis x(kLeft, kWidth - kRight), y(kHeight - kBottom, kTop);
   for (const AccuracyRow& row : curve.rows) {
-    if (!row.stable) continue;
+    if (!row.stable && !row.falls) continue;
     x.hold(row.ms_per_sim_s);
     y.hold(std::max(row.error_rel_length, 0.1 * curve.floor));
   }
@@ -159,6 +159,10 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
   std::vector<std::string> methods;
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
     const AccuracyRow& row = curve.rows[k];
+    if (row.falls) {
+      svg += "<text x=\"" + short_number(x.at(row.ms_per_sim_s), 5) + "\" y=\"" + short_number(y.at(row.error_rel_length) + 4, 5) +
+             "\" text-anchor=\"middle\" fill=\"#c33\">&#215; " + std::to_string(row.nodes) + " nodes: falls</text>\n";
+    }
     if (!row.stable) continue;
     if (std::find(methods.begin(), methods.end(), row.method) == methods.end()) methods.push_back(row.method);
     const std::string at =
@@ -230,6 +234,7 @@ std::string accuracy_json(const AccuracyCurve& curve) {
                             {"momentum_error", row.momentum_error},
                             {"angular_error", row.angular_error},
                             {"stable", row.stable},
+                            {"falls", row.falls},
                             {"on_front", static_cast<bool>(front[k])}});
   }
   return json.dump(1) + "\n";

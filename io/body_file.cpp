@@ -117,6 +117,7 @@ retarget::Embedding read_embedding(const Reader& reader, const Json& parent, Eig
   embedding.weights = reader.columns<double, 4>(parent, "weights");
   if (embedding.nodes.cols() != count || embedding.weights.cols() != count) reader.refuse("'weights'", "are not as many as the points");
   reader.expect_indices(embedding.nodes, nodes, "nodes");
+  embedding.tets = Eigen::VectorXi::Constant(count, -1);  // the file does not tell them, but points are counted by them
   return embedding;
 }
 

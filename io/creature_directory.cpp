@@ -20,9 +20,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 13> kOwnFiles{"appearance.bin", "morphs.bin", "creature.toml", "body.json",   "target.bin",
+constexpr std::array<std::string_view, 14> kOwnFiles{"appearance.bin", "morphs.bin", "creature.toml", "body.json",   "target.bin",
                                                      "signals.json",   "reference.glb", "replay.glb",  "failed.glb",
-                                                     "report.json",    "report.html",   "accuracy.csv", "accuracy.svg"};
+                                                     "report.json",    "report.html",   "accuracy.csv", "accuracy.svg",
+                                                     "rig.bin"};
 
 Error directory_error(const fs::path& shown_as, int error_number) {
   return {shown_as.string(), "", std::string("the directory cannot be written: ") + std::strerror(error_number),

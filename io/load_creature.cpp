@@ -72,6 +72,26 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
   return loaded;
 }
 
+retarget::Rig load_rig(const std::filesystem::path& creature, const LoadedCreature& loaded) {
+  const std::filesystem::path file = creature / "rig.bin";
+  if (!std::filesystem::exists(file)) throw Error(file.string(), "", "is missing: other levels are made from it", kMend);
+  const retarget::Performer& performer = loaded.target.performer;
+  return parse_rig(read_file(file), file.string(), performer.mesh.node_count(), performer.skin.vertices.cols());
+}
+
+retarget::CreatureOptions level_options(const LoadedCreature& loaded) {
+  const std::vector<physics::BodyElements<3>>& elements = loaded.target.performer.scene.body.elements;
+  retarget::CreatureOptions options;
+  options.friction = loaded.target.performer.scene.ground.friction;
+  options.hexahedra = !elements.empty() && elements.front().block.is_box();
+  options.material =
+      elements.empty() ? retarget::BodyMaterial::kSprings : retarget::material_of(elements.front().block.law);
+  for (const auto& [name, value] : loaded.record.settings) {
+    if (const bool* is_on = std::get_if<bool>(&value); is_on != nullptr && name == "calibrated") options.calibrated = *is_on;
+  }
+  return options;
+}
+
 double setting(const CreatureRecord& record, const std::string& name, double otherwise) {
   for (const auto& [key, value] : record.settings) {
     if (key != name) continue;

@@ -19,6 +19,12 @@ struct LoadedCreature {
 /// damaged, or does not belong to the others.
 LoadedCreature load_creature(const std::filesystem::path& creature);
 
+/// Reads rig.bin, which other levels of detail are made from. Throws Error as above.
+retarget::Rig load_rig(const std::filesystem::path& creature, const LoadedCreature& loaded);
+
+/// The elements, material and friction that a creature was made with, as its levels want them.
+retarget::CreatureOptions level_options(const LoadedCreature& loaded);
+
 /// A setting of creature.toml as a number or text, or `otherwise` where there is none of that kind.
 double setting(const CreatureRecord& record, const std::string& name, double otherwise);
 std::string setting(const CreatureRecord& record, const std::string& name, const std::string& otherwise);

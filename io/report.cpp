@@ -171,6 +171,13 @@ void fill(Group& group, const retarget::EffectReport& effect) {
   group.add("ms_per_sim_s", effect.ms_per_sim_s);
 }
 
+void fill(Group& group, const retarget::LevelReport& level) {
+  group.add("nodes", level.nodes);
+  group.add("solved_nodes", level.solved_nodes);
+  group.add("work_ms", level.work_ms);
+  if (level.budget_ms > 0) group.add("budget_ms", level.budget_ms);
+}
+
 void fill(Group& group, const retarget::AccuracyReport& accuracy) {
   group.add("method", accuracy.method);
   group.add("element", accuracy.element);
@@ -232,6 +239,7 @@ std::string report_json(const retarget::RunReport& report) {
     json["effects"].push_back(group_json("effects." + effect.name, effect, warnings));
   }
   json["accuracy"] = group_json("accuracy", report.accuracy, warnings);
+  if (report.level) json["level"] = group_json("level", *report.level, warnings);
   json["timing_s"] = group_json("timing_s", report.timing_s, warnings);
   json["warnings"] = warnings;
   // A name from a foreign file may hold bytes that are no UTF-8; they are shown as U+FFFD.

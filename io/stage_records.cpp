@@ -11,6 +11,8 @@ namespace {
 
 constexpr const char* kTargetTitle = "hydrostat.target";
 constexpr const char* kTargetVersion = "2";
+constexpr const char* kRigTitle = "hydrostat.rig";
+constexpr const char* kRigVersion = "1";
 constexpr const char* kAppearanceTitle = "hydrostat.appearance";
 constexpr const char* kAppearanceVersion = "1";
 constexpr const char* kMorphsTitle = "hydrostat.morphs";
@@ -35,10 +37,12 @@ Influences in_a_row(const retarget::SkinnedMesh& skin) {
   return row;
 }
 
+/// Throws std::out_of_range for influences on vertices that there are not.
 void hand_out(const Influences& row, retarget::SkinnedMesh& skin) {
+  if (row.places.rows() != 2 || row.places.cols() != row.weights.size()) throw std::out_of_range("influences");
   skin.skin_weights.assign(static_cast<std::size_t>(skin.vertices.cols()), {});
   for (Eigen::Index i = 0; i < row.weights.size(); ++i)
-    skin.skin_weights[static_cast<std::size_t>(row.places(0, i))].push_back({row.places(1, i), row.weights[i]});
+    skin.skin_weights.at(static_cast<std::size_t>(row.places(0, i))).push_back({row.places(1, i), row.weights[i]});
 }
 
 }  // namespace
@@ -84,6 +88,10 @@ void name_fields(RecordArchive& archive, retarget::Character& character) {
 
 void name_fields(RecordArchive& archive, ImportedCharacter& imported) {
   archive.fields("character", imported.character, "warnings", imported.warnings);
+}
+
+void name_fields(RecordArchive& archive, retarget::Rig& rig) {
+  archive.fields("skeleton", rig.skeleton, "skin", rig.skin, "bone_weights", rig.bone_weights);
 }
 
 void name_fields(RecordArchive& archive, retarget::ControlMesh& mesh) {
@@ -296,8 +304,38 @@ HYDROSTAT_RECORD(retarget::InverseDynamics)
 HYDROSTAT_RECORD(retarget::Performances)
 HYDROSTAT_RECORD(PerformedTarget)
 HYDROSTAT_RECORD(Appearance)
+HYDROSTAT_RECORD(retarget::Rig)
 HYDROSTAT_RECORD(retarget::MovingMorphs)
 #undef HYDROSTAT_RECORD
+
+std::string rig_bytes(const retarget::Rig& rig) { return packed(record_of(rig), kRigTitle, kRigVersion); }
+
+retarget::Rig parse_rig(const std::string& bytes, const std::string& file, Eigen::Index nodes, Eigen::Index vertices) {
+  const char* const mend = "Make the creature again with 'hydrostat convert'.";
+  const Error damaged(file, "", "is damaged or of another version", mend);
+  const std::optional<Record> record = unpacked(bytes, kRigTitle, kRigVersion);
+  if (!record) throw damaged;
+  retarget::Rig rig;
+  try {
+    rig = result_of<retarget::Rig>(*record);
+  } catch (const std::out_of_range&) {
+    throw damaged;
+  }
+  const Eigen::Index bones = rig.skeleton.count();
+  bool fits = rig.bone_weights.cols() == nodes && rig.bone_weights.rows() == bones && rig.skin.vertices.cols() == vertices &&
+              rig.skin.triangles.size() > 0 && rig.skin.triangles.minCoeff() >= 0 &&
+              rig.skin.triangles.maxCoeff() < vertices &&
+              static_cast<Eigen::Index>(rig.skeleton.parents.size()) == bones &&
+              static_cast<Eigen::Index>(rig.skeleton.bind_pose.size()) == bones &&
+              static_cast<Eigen::Index>(rig.skeleton.weighted.size()) == bones;
+  for (std::size_t b = 0; fits && b < rig.skeleton.parents.size(); ++b)
+    fits = rig.skeleton.parents[b] >= -1 && rig.skeleton.parents[b] < static_cast<int>(b);
+  for (std::size_t v = 0; fits && v < rig.skin.skin_weights.size(); ++v) {
+    for (const auto& influence : rig.skin.skin_weights[v]) fits = fits && influence.bone >= 0 && influence.bone < bones;
+  }
+  if (!fits) throw Error(file, "", "does not belong to body.json", mend);
+  return rig;
+}
 
 std::string target_bytes(const PerformedTarget& target) { return packed(record_of(target), kTargetTitle, kTargetVersion); }
 

@@ -3,6 +3,7 @@
 #include "io/appearance.h"
 #include "io/stage_cache.h"
 #include "retarget/creature.h"
+#include "retarget/level.h"
 #include "retarget/performance.h"
 
 namespace hydrostat::io {
@@ -39,6 +40,10 @@ std::string appearance_bytes(const Appearance& appearance);
 /// `vertices`: of the skin. Throws Error for bytes that are damaged, of another version or about another skin.
 Appearance parse_appearance(const std::string& bytes, const std::string& file, Eigen::Index vertices);
 
+/// rig.bin: what other levels of detail are made from, "hydrostat.rig/1".
+std::string rig_bytes(const retarget::Rig& rig);
+/// `nodes`: of the creature. Throws Error for bytes that are damaged, of another version or about another body.
+retarget::Rig parse_rig(const std::string& bytes, const std::string& file, Eigen::Index nodes, Eigen::Index vertices);
 /// morphs.bin: the morph targets that a creature wears, "hydrostat.morphs/1".
 std::string morphs_bytes(const retarget::MovingMorphs& morphs);
 /// `vertices`: of the skin. Throws Error for bytes that are damaged, of another version or about another skin.

@@ -242,7 +242,13 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   const bool is_same = is_same_mesh(reference.scenario.scene.body, body);
   const ContactPointsOf<Dim> skin =
       is_same ? reference.skin : carried<Dim>(body, rest_places(reference.scenario.scene.body, reference.skin));
-  const std::vector<WindowOf<Dim>> windows = is_same ? reference.windows : carried_windows(reference, body);
+  return measure_error(reference, scenario, setting, is_same ? reference.windows : carried_windows(reference, body), skin);
+}
+
+template <int Dim>
+AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Dim>& scenario, const StepSetting& setting,
+                          const std::vector<WindowOf<Dim>>& windows, const ContactPointsOf<Dim>& skin) {
+  const physics::BodyOf<Dim>& body = scenario.scene.body;
   const Repeated<Dim> repeated = repeat(scenario, windows, setting, reference.options.frame_s, skin, true);
   AccuracyRow row;
   row.method = physics::name_of(setting.method);
@@ -368,6 +374,8 @@ double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions&
   template ReferenceOf<Dim> make_reference<Dim>(const ScenarioOf<Dim>&, const AccuracyOptions&, std::vector<WindowOf<Dim>>, \
                                                 ContactPointsOf<Dim>, bool);                                                \
   template AccuracyRow measure_error<Dim>(const ReferenceOf<Dim>&, const ScenarioOf<Dim>&, const StepSetting&);             \
+  template AccuracyRow measure_error<Dim>(const ReferenceOf<Dim>&, const ScenarioOf<Dim>&, const StepSetting&,              \
+                                          const std::vector<WindowOf<Dim>>&, const ContactPointsOf<Dim>&);                  \
   template std::vector<std::vector<StepSetting>> settings_to_try<Dim>(const physics::SceneOf<Dim>&, double);                \
   template StepChoice choose_setting<Dim>(const ReferenceOf<Dim>&, double, std::optional<physics::Method>);                 \
   template double estimated_error<Dim>(const ScenarioOf<Dim>&, const SimulationOptions&);

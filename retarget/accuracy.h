@@ -73,11 +73,17 @@ struct AccuracyRow {
   double volume_error = 0;                       // the whole body's, at most
   double momentum_error = 0, angular_error = 0;  // what booked impulses do not explain: m g, m g L
   bool stable = true;                            // finite, and no further away than L
+  bool falls = false;                            // of a creature's level: its closed loop does not stay up; never stable
 };
 
 /// Repeats the reference's windows. The scenario may hold the same body in another mesh: starts are then carried over.
 template <int Dim>
 AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Dim>& scenario, const StepSetting& setting);
+
+/// The same with the windows and the skin's points as they are on the scenario's own mesh.
+template <int Dim>
+AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Dim>& scenario, const StepSetting& setting,
+                          const std::vector<WindowOf<Dim>>& windows, const physics::ContactPointsOf<Dim>& skin);
 
 /// Methods and steps that are tried on a body, each method's from long steps to short ones; steps are whole parts of
 /// `frame_s`.

@@ -64,7 +64,8 @@ Eigen::VectorXd solve_within_cones(const Eigen::MatrixXd& hessian, const Eigen::
     if (outside == outside_before) break;
     const Eigen::MatrixXd active = weight * rows(outside, Eigen::all);
     Eigen::MatrixXd stiffer = hessian;
-    stiffer.selfadjointView<Eigen::Lower>().rankUpdate(active.leftCols(muscles).transpose());
+    // Of no rows Eigen would divide by zero; they are none where a step that overshot a cone is taken back.
+    if (!outside.empty()) stiffer.selfadjointView<Eigen::Lower>().rankUpdate(active.leftCols(muscles).transpose());
     const Eigen::VectorXd gradient =
         hessian.selfadjointView<Eigen::Lower>() * w - b + active.leftCols(muscles).transpose() * (weight * margin(outside));
     const Eigen::VectorXd way = -stiffer.selfadjointView<Eigen::Lower>().llt().solve(gradient);

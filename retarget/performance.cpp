@@ -92,6 +92,26 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
   return result;
 }
 
+Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options,
+                            double& effort) {
+  effort = 1;
+  Performances result = perform(performer, signals, options);
+  PerformOptions calmer = options;
+  calmer.baselines = false;
+  const auto is_up = [](const Performances& runs) {
+    return !runs.main().report.fell && runs.main().termination == physics::Termination::kDone;
+  };
+  for (const double factor : {4.0, 16.0, 64.0}) {
+    if (!options.closed_loop || is_up(result)) break;
+    calmer.replay.corrector.effort = factor * options.replay.corrector.effort;
+    Performances next = perform(performer, signals, calmer);
+    if (!is_up(next)) continue;
+    result.closed_loop = std::move(next.closed_loop);
+    effort = factor;
+  }
+  return result;
+}
+
 double substep_error(const Performer& performer, const SignalSet& signals, const ReplayOptions& options) {
   ReplayOptions coarse = options;
   coarse.correct = coarse.trace = false;

@@ -60,6 +60,12 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 /// layers.
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
+/// The same, on calmer feedback where the closed loop falls: effort is 4, 16, then 64 times as dear, and the first with which
+/// it stays up counts, or the usual one where none does. On coarse bodies a gain that others need shakes the feet loose. Says in
+/// `effort` by what factor.
+Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options,
+                            double& effort);
+
 /// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's
 /// substep is halved.
 double substep_error(const Performer& performer, const SignalSet& signals, const ReplayOptions& options);

@@ -44,6 +44,15 @@ ReferenceOf<3> performed_reference(const Performer& performer, const SignalSet& 
   return make_reference<3>(scenario, options, std::move(windows), skin, is_checked);
 }
 
+AccuracyRow measure_level(const ReferenceOf<3>& reference, const Performer& level, const SignalSet& signals,
+                          const StepSetting& setting) {
+  const MotionCurve curve(level.prepared.target);
+  std::vector<WindowOf<3>> windows = reference.windows;
+  for (WindowOf<3>& window : windows) curve.at(window.begin_s, window.start.x, window.start.v);
+  return measure_error(reference, performed_scenario(level, signals), setting, windows,
+                       physics::ContactPointsOf<3>{level.embedding.nodes, level.embedding.weights});
+}
+
 Replay perform_briefly(const Performer& performer, const SignalSet& signals, const ReplayOptions& options) {
   const Motion& target = performer.prepared.target;
   PerformOptions perform_options;

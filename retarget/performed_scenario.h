@@ -17,6 +17,10 @@ ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& si
 ReferenceOf<3> performed_reference(const Performer& performer, const SignalSet& signals, const AccuracyOptions& options,
                                    bool is_checked = true);
 
+/// How far a level of the creature (retarget/level.h) is from the reference: in its windows, each from the level's own target.
+AccuracyRow measure_level(const ReferenceOf<3>& reference, const Performer& level, const SignalSet& signals,
+                          const StepSetting& setting);
+
 /// The closed loop from the start of the target, for two periods, 2 to 4 s. Small errors of a window may add up to a fall:
 /// here they show.
 Replay perform_briefly(const Performer& performer, const SignalSet& signals, const ReplayOptions& options);

@@ -92,6 +92,13 @@ struct AccuracyReport {
   bool is_met() const { return max_error_length == 0 || estimated_error_length <= max_error_length; }
 };
 
+/// Of a replay on another control mesh than the creature was solved on.
+struct LevelReport {
+  int nodes = 0, solved_nodes = 0;
+  double work_ms = 0;    // counted, a frame of 1/60 s
+  double budget_ms = 0;  // 0: none was asked for
+};
+
 struct RunReport {
   SourceReport source;
   BodyReport body;
@@ -103,6 +110,7 @@ struct RunReport {
   std::optional<SimulationReport> simulation;  // in place of all that tells of a clip
   std::vector<EffectReport> effects;
   AccuracyReport accuracy;
+  std::optional<LevelReport> level;
   std::vector<std::pair<std::string, double>> timing_s;  // per stage, in order
   std::vector<std::string> warnings;
   bool outcome_ok = true;  // false: fell, diverged or short of what was asked (exit code 3)

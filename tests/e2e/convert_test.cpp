@@ -66,7 +66,7 @@ const std::set<std::string> kReplayKeys{
 
 void expect_contract(const fs::path& creature, bool stays_up) {
   std::set<std::string> files{"creature.toml", "appearance.bin", "body.json",   "target.bin", "signals.json",
-                              "reference.glb", "report.json",    "report.html", "cache"};
+                              "reference.glb", "report.json",    "report.html", "cache",      "rig.bin"};
   files.insert(stays_up ? "replay.glb" : "failed.glb");
   EXPECT_EQ(names_in(creature), files);
   const json report = report_of(creature);

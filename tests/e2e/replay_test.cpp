@@ -48,6 +48,34 @@ TEST_F(Replay, PlaysTheLayersOfTheSignals) {
   EXPECT_EQ(motion_bytes(creature_), motion);
 }
 
+TEST_F(Replay, OnOtherLevelsIsTheSameEachTimeAndRefusesWhatCannotBe) {
+  const std::string motion = motion_bytes(creature_);
+  const auto level = [&](const std::string& options, const std::string& file) {
+    const Outcome outcome = replay("--duration 0.3 -o " + file + " " + options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.out;
+  };
+  const std::string told = level("--lod 60 --threads 1", "one.glb");
+  EXPECT_NE(told.find("(solved on "), std::string::npos) << told;
+  level("--lod 60 --threads 2", "two.glb");
+  EXPECT_EQ(io::read_file(directory_.path / "one.glb"), io::read_file(directory_.path / "two.glb"));
+  const Outcome too_little = replay("--lod auto --budget 0.001ms");
+  EXPECT_EQ(too_little.exit_code, 2);
+  const auto told_between = [&too_little](const std::string& before, const std::string& after) {
+    const std::size_t begin = too_little.err.find(before) + before.size();
+    return too_little.err.substr(begin, too_little.err.find(after, begin) - begin);
+  };
+  const std::string nodes = told_between("the cheapest, of ", " nodes"), possible = told_between("Allow ", ".\n");
+  EXPECT_NE(level("--lod auto --budget " + possible, "cheap.glb").find("on " + nodes + " nodes"), std::string::npos) << too_little.err;
+  EXPECT_EQ(motion_bytes(creature_), motion);
+  for (const char* options : {"--lod auto", "--lod 60 --budget 2ms", "--budget 2ms", "--lod 3", "--lod 60.5", "--lod auto --budget soon"})
+    EXPECT_EQ(replay(options).exit_code, 2) << options;
+  fs::remove(creature_ / "rig.bin");
+  const Outcome old = replay("--lod 60");
+  EXPECT_EQ(old.exit_code, 1);
+  EXPECT_NE(old.err.find("rig.bin"), std::string::npos) << old.err;
+}
+
 TEST_F(Replay, WithAFileOfItsOwnLeavesTheCreatureAlone) {
   const std::string motion = motion_bytes(creature_), report = io::read_file(creature_ / "report.json");
   const std::set<std::string> files = names_in(creature_);
@@ -59,14 +87,12 @@ TEST_F(Replay, WithAFileOfItsOwnLeavesTheCreatureAlone) {
   EXPECT_EQ(names_in(creature_), files);
 }
 
-TEST_F(Replay, RunsForAsLongAsAsked) {
+TEST_F(Replay, RunsForAsLongAsAskedAndWithoutTheCorrectorHasNoClosedLoop) {
   replay("--cycles 2");
   EXPECT_NEAR(report_of(creature_)["replay"]["closed_loop"]["cycles"].get<double>(), 2, 1e-9);
   replay("--duration 0.5");
   EXPECT_NEAR(report_of(creature_)["replay"]["closed_loop"]["duration_s"].get<double>(), 0.5, 1e-9);
-}
 
-TEST_F(Replay, WithoutTheCorrectorHasNoClosedLoop) {
   replay("--cycles 1 --open-loop");
   const nlohmann::json runs = report_of(creature_)["replay"];
   EXPECT_TRUE(runs["closed_loop"].is_null());
@@ -104,7 +130,7 @@ TEST_F(Replay, TracesTheMeansOverLongerRows) {
   EXPECT_LT(fine.path_miss, 0.7 * coarse.path_miss);  // positions follow velocities the better the shorter the rows
 }
 
-TEST_F(Replay, RefusesWhatItCannotDo) {
+TEST_F(Replay, RefusesWhatItCannotDoAndABodyThatIsNotItsOwn) {
   const auto expect = [&](const std::string& options, int exit_code, const std::string& told) {
     SCOPED_TRACE(options);
     const Outcome outcome = replay(options);
@@ -127,35 +153,34 @@ TEST_F(Replay, RefusesWhatItCannotDo) {
   expect("-o missing/../motion.glb --trace creature --duration 0.1", 1, "creature: ");
   EXPECT_EQ(motion_bytes(creature_), motion);
 
-  std::ofstream(creature_ / "signals.json") << "{}";
-  expect("--duration 0.1", 1, "signals.json: ");
-  fs::remove(creature_ / "target.bin");
-  expect("--duration 0.1", 1, "target.bin: ");
-  fs::remove(creature_ / "creature.toml");
-  expect("--duration 0.1", 1, "creature: is no creature. Make one with 'hydrostat convert'.");
-}
-
-TEST_F(Replay, RefusesABodyThatIsNotItsOwn) {
   const std::string body = io::read_file(creature_ / "body.json");
-  const auto expect = [&](const std::string& broken, const std::string& told) {
+  const auto expect_of_body = [&](const std::string& broken, const std::string& told) {
     std::ofstream(creature_ / "body.json") << broken;
     const Outcome outcome = replay("--duration 0.1");
     EXPECT_EQ(outcome.exit_code, 1);
     EXPECT_NE(outcome.err.find("body.json: " + told), std::string::npos) << outcome.err;
   };
-  expect("not JSON", "");
+  expect_of_body("not JSON", "");
   nlohmann::json json = nlohmann::json::parse(body);
   const auto changed = [&](const char* key, const nlohmann::json& value) {
     nlohmann::json copy = json;
     copy[key] = value;
     return copy.dump();
   };
-  expect(changed("schema", "hydrostat.body/9"), "'schema': ");
-  expect(changed("mass_kg", {1, 2}), "'mass_kg': has 2 entries where ");
-  expect(changed("tets", {{0, 1, 2, 100000}}), "'tets': points at something that does not exist.");
-  expect(changed("tets", {{0, 1, 2}}), "'tets', entry 0: has not 4 numbers.");
-  expect(changed("edges", {{0, 1}}), "");
-  expect(changed("length_m", -1), "'length_m': is no number above 0.");
+  expect_of_body(changed("schema", "hydrostat.body/9"), "'schema': ");
+  expect_of_body(changed("mass_kg", {1, 2}), "'mass_kg': has 2 entries where ");
+  expect_of_body(changed("tets", {{0, 1, 2, 100000}}), "'tets': points at something that does not exist.");
+  expect_of_body(changed("tets", {{0, 1, 2}}), "'tets', entry 0: has not 4 numbers.");
+  expect_of_body(changed("edges", {{0, 1}}), "");
+  expect_of_body(changed("length_m", -1), "'length_m': is no number above 0.");
+  std::ofstream(creature_ / "body.json") << body;
+
+  std::ofstream(creature_ / "signals.json") << "{}";
+  expect("--duration 0.1", 1, "signals.json: ");
+  fs::remove(creature_ / "target.bin");
+  expect("--duration 0.1", 1, "target.bin: ");
+  fs::remove(creature_ / "creature.toml");
+  expect("--duration 0.1", 1, "creature: is no creature. Make one with 'hydrostat convert'.");
 }
 
 }  // namespace

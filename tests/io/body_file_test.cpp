@@ -33,6 +33,7 @@ TEST(BodyFile, GivesTheBodyBackToTheBit) {
   EXPECT_EQ(performer.skin.vertices, read.skin.vertices);
   EXPECT_EQ(performer.skin.triangles, read.skin.triangles);
   EXPECT_EQ(performer.embedding.nodes, read.embedding.nodes);
+  EXPECT_EQ(read.embedding.count(), performer.embedding.nodes.cols());
   EXPECT_EQ(performer.muscles.names, read.muscles.names);
   EXPECT_EQ(performer.muscles.edge_bone, read.muscles.edge_bone);
   EXPECT_EQ(performer.length, read.length);

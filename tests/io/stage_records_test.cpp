@@ -75,5 +75,33 @@ TEST(TargetFile, ComesBackWholeOrNotAtAll) {
   }
 }
 
+TEST(RigFile, ComesBackWholeOrNotAtAll) {
+  const retarget::BoxCreature box = retarget::make_box_creature();
+  const Eigen::Index nodes = box.scene.body.node_count(), vertices = nodes;
+  retarget::Rig rig{box.skeleton, {box.scene.body.rest, {}, {}}, box.bone_weights};
+  rig.skin.skin_weights.assign(static_cast<std::size_t>(vertices), {{0, 0.25}, {3, 0.75}});
+  rig.skin.triangles.resize(3, 1);
+  rig.skin.triangles << 0, 1, 2;
+  const std::string bytes = rig_bytes(rig);
+  EXPECT_EQ(rig_bytes(parse_rig(bytes, "rig.bin", nodes, vertices)), bytes);
+  EXPECT_THROW(parse_rig(bytes, "rig.bin", nodes + 1, vertices), Error) << "of another body";
+  EXPECT_THROW(parse_rig(bytes, "rig.bin", nodes, vertices - 1), Error);
+  for (const std::size_t place : {std::size_t{3}, bytes.size() / 2, bytes.size() - 1}) {
+    std::string damaged = bytes;
+    damaged[place] = static_cast<char>(damaged[place] ^ 1);
+    EXPECT_THROW(parse_rig(damaged, "rig.bin", nodes, vertices), Error);
+    EXPECT_THROW(parse_rig(bytes.substr(0, place), "rig.bin", nodes, vertices), Error);
+  }
+  const auto refused = [&](const char* what, const auto& spoil) {
+    retarget::Rig spoilt = rig;
+    spoil(spoilt);
+    EXPECT_THROW(parse_rig(rig_bytes(spoilt), "rig.bin", nodes, vertices), Error) << what;
+  };
+  refused("parents", [](retarget::Rig& spoilt) { spoilt.skeleton.parents[0] = 1; });
+  refused("triangles", [](retarget::Rig& spoilt) { spoilt.skin.triangles(0, 0) = -1; });
+  refused("bone", [](retarget::Rig& spoilt) { spoilt.skin.skin_weights[0][0].bone = 99; });
+  refused("vertex", [](retarget::Rig& spoilt) { spoilt.skin.skin_weights.push_back({{0, 1.0}}); });
+}
+
 }  // namespace
 }  // namespace hydrostat::io

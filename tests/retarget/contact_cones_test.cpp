@@ -48,6 +48,25 @@ TEST(ContactCones, SolutionsAreMinima) {
   }
 }
 
+// Here the second step ends inside all cones, with no row left to press; beside the two muscles that matter stand as many as
+// a creature has.
+TEST(ContactCones, AStepThatEndsInsideAllConesIsTaken) {
+  Problem problem{Eigen::MatrixXd(2, 2), Eigen::MatrixXd(3, 3), Eigen::Vector2d(8, -3)};
+  problem.hessian << 1, 0.9, 0.9, 1;
+  problem.rows << 0, 3, -4, 1, 3, 0, 3, -3, 2;
+  const Eigen::VectorXd few = solve_within_cones(problem.hessian, problem.b, problem.rows, 10);
+  constexpr Eigen::Index kMuscles = 117;
+  Problem many{Eigen::MatrixXd::Identity(kMuscles, kMuscles), Eigen::MatrixXd::Zero(3, kMuscles + 1),
+               Eigen::VectorXd::Zero(kMuscles)};
+  many.hessian.topLeftCorner<2, 2>() = problem.hessian;
+  many.rows.leftCols<2>() = problem.rows.leftCols<2>();
+  many.rows.rightCols<1>() = problem.rows.rightCols<1>();
+  many.b.head<2>() = problem.b;
+  const Eigen::VectorXd found = solve_within_cones(many.hessian, many.b, many.rows, 10);
+  EXPECT_LT((found.head<2>() - few).norm(), 1e-12);
+  EXPECT_TRUE(found.tail(kMuscles - 2).isZero(0));
+}
+
 TEST(ContactCones, NothingChangesInsideTheCones) {
   for (unsigned seed = 0; seed < 50; ++seed) {
     Problem p = random_problem(seed);

@@ -1,0 +1,179 @@
+#include "retarget/level_target.h"
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "retarget/balance.h"
+#include "retarget/mesh_places.h"
+#include "retarget/shape_projection.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+using Triplets = std::vector<Eigen::Triplet<double>>;
+
+constexpr double kJumps = 1e-3;      // per squared change of the deformation from tet to tet, in cells
+constexpr double kInside = 0.3;      // of the inside beside the skin, where nodes are placed
+constexpr double kTouching = 0.003;  // per D: points of a contact that ended higher bear no load
+
+/// Share of the skin's area that each vertex stands for.
+Eigen::VectorXd vertex_shares(const SkinnedMesh& skin) {
+  Eigen::VectorXd shares = Eigen::VectorXd::Zero(skin.vertices.cols());
+  for (const auto corners : skin.triangles.colwise()) {
+    const Eigen::Vector3d origin = skin.vertices.col(corners[0]);
+    const double area = (skin.vertices.col(corners[1]) - origin).cross(skin.vertices.col(corners[2]) - origin).norm();
+    for (const int v : corners) shares[v] += area;
+  }
+  shares.array() += 1e-6 * shares.mean();
+  return shares / shares.sum();
+}
+
+/// Adds the squared changes of the deformation over the faces between tets.
+void add_jumps(const ControlMesh& mesh, Triplets& terms) {
+  std::map<std::array<int, 3>, Eigen::Index> first;  // tet at a face
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> pairs;
+  for (Eigen::Index t = 0; t < mesh.tets.cols(); ++t) {
+    for (int left_out = 0; left_out < 4; ++left_out) {
+      std::array<int, 3> face{};
+      for (int k = 0, n = 0; k < 4; ++k) {
+        if (k != left_out) face[static_cast<std::size_t>(n++)] = mesh.tets(k, t);
+      }
+      std::sort(face.begin(), face.end());
+      const auto [place, is_new] = first.emplace(face, t);
+      if (!is_new) pairs.emplace_back(place->second, t);
+    }
+  }
+  const auto gradients = [&](Eigen::Index t) {
+    Eigen::Matrix3d spans;
+    for (int k = 0; k < 3; ++k) spans.col(k) = mesh.nodes.col(mesh.tets(k + 1, t)) - mesh.nodes.col(mesh.tets(0, t));
+    Eigen::Matrix<double, 4, 3> result;
+    result.bottomRows<3>() = spans.inverse();
+    result.row(0) = -result.bottomRows<3>().colwise().sum();
+    return result;
+  };
+  const double weight = kJumps * std::pow(mesh.cell_size.mean(), 2) / static_cast<double>(pairs.size());
+  for (const auto& [a, b] : pairs) {
+    Eigen::Matrix<double, 8, 3> jump;
+    jump << gradients(a), -gradients(b);
+    const Eigen::Matrix<double, 8, 8> products = weight * jump * jump.transpose();
+    for (int r = 0; r < 8; ++r) {
+      for (int c = 0; c < 8; ++c)
+        terms.emplace_back(mesh.tets(r % 4, r < 4 ? a : b), mesh.tets(c % 4, c < 4 ? a : b), products(r, c));
+    }
+  }
+}
+
+/// The target on the nodes of the level.
+Motion carried_motion(const Performer& solved, const Rig& rig, const Creature& level) {
+  const ControlMesh& mesh = level.mesh;
+  const Motion& target = solved.prepared.target;
+  const Places inside = locate(solved.mesh, rig.bone_weights, mesh.nodes, mesh.bone_weights);
+  const Eigen::VectorXd shares = vertex_shares(rig.skin);
+  Triplets terms;
+  add_jumps(mesh, terms);
+  for (Eigen::Index v = 0; v < level.skin.count(); ++v) {
+    for (int r = 0; r < 4; ++r) {
+      for (int c = 0; c < 4; ++c) {
+        terms.emplace_back(level.skin.nodes(r, v), level.skin.nodes(c, v),
+                           shares[v] * level.skin.weights(r, v) * level.skin.weights(c, v));
+      }
+    }
+  }
+  const double inner = kInside / mesh.node_count();
+  for (int i = 0; i < mesh.node_count(); ++i) {
+    if (inside.is_inside[static_cast<std::size_t>(i)]) terms.emplace_back(i, i, inner);
+  }
+  Eigen::SparseMatrix<double> normal(mesh.node_count(), mesh.node_count());
+  normal.setFromTriplets(terms.begin(), terms.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
+
+  Motion carried = target;
+  carried.frames.resize(3 * mesh.node_count(), target.count());
+  for (Eigen::Index f = 0; f < target.count(); ++f) {
+    const Eigen::Matrix3Xd skin = embedded_positions(solved.embedding, target.at(f));
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(mesh.node_count(), 3);
+    for (Eigen::Index v = 0; v < skin.cols(); ++v) {
+      for (int r = 0; r < 4; ++r)
+        right.row(level.skin.nodes(r, v)) += shares[v] * level.skin.weights(r, v) * skin.col(v).transpose();
+    }
+    for (int i = 0; i < mesh.node_count(); ++i) {
+      if (!inside.is_inside[static_cast<std::size_t>(i)]) continue;
+      for (int c = 0; c < 4; ++c)
+        right.row(i) += inner * inside.weights(c, i) * target.at(f).col(inside.nodes(c, i)).transpose();
+    }
+    carried.at(f) = factor.solve(right).transpose();
+  }
+  return carried;
+}
+
+/// What the patches do, for the contact points of the level: those of the same bone.
+ContactSchedule carried_contacts(const ContactSchedule& solved, const Skeleton& skeleton, const Creature& level) {
+  ContactSchedule contacts;
+  std::vector<Eigen::Index> kept;
+  for (std::size_t k = 0; k < solved.patches.size(); ++k) {
+    Patch patch{solved.patches[k].name, {}, solved.patches[k].on_leg};
+    for (int p = 0; p < level.contacts.bones.size(); ++p) {
+      if (skeleton.names[static_cast<std::size_t>(level.contacts.bones[p])] == patch.name) patch.points.push_back(p);
+    }
+    if (patch.points.empty()) continue;
+    contacts.patches.push_back(std::move(patch));
+    contacts.state.push_back(solved.state[k]);
+    kept.push_back(static_cast<Eigen::Index>(k));
+  }
+  contacts.sliding_x = solved.sliding_x(kept, Eigen::all);
+  contacts.sliding_z = solved.sliding_z(kept, Eigen::all);
+  contacts.touching.resize(level.contacts.vertices.size(), solved.touching.cols());
+  return contacts;
+}
+
+/// Volume, contacts and balance of the target as the preparation leaves them. size [m] is D.
+void project(const Creature& level, double size, PreparedTarget& prepared) {
+  const PrepareOptions options;
+  const physics::Scene scene = preparation_scene(level);
+  const auto mark = [&](double height) {
+    mark_touching(point_motion(scene.contact_points, prepared.target), height * size, prepared.contacts);
+  };
+  mark(options.contacts.load_height);
+  const std::vector<std::vector<Hold>> holds =
+      find_holds(prepared.contacts, point_motion(scene.contact_points, prepared.target));
+  const Eigen::MatrixXd floor =
+      floors(prepared.contacts, prepared.target.loop, options.clearance * size, options.clearance_frames);
+  ShapeProjector projector(scene, level.length, true);
+  Motion wanted = prepared.target;
+  prepared.target = project_frames(wanted, holds, floor, projector, options.smooth_hz);
+  mark(kTouching);
+  for (int round = 0; round < options.rounds && !scene.gravity.isZero(0); ++round) {
+    const Shift shift = find_shift(prepared.target, scene, prepared.contacts, level.length, options.support_friction);
+    wanted = shifted(wanted, shift, scene.body);
+    prepared.target = project_frames(wanted, holds, floor, projector, options.smooth_hz);
+    fall_freely(prepared.contacts, scene, prepared.target);
+    mark(kTouching);
+  }
+}
+
+}  // namespace
+
+PreparedTarget carried_target(const Performer& solved, const Rig& rig, const Creature& level) {
+  PreparedTarget prepared = solved.prepared;
+  prepared.target = carried_motion(solved, rig, level);
+  prepared.contacts = carried_contacts(solved.prepared.contacts, rig.skeleton, level);
+  project(level, solved.size, prepared);
+  return prepared;
+}
+
+Motion carried_clip_points(const Performer& solved, const ContactPoints& contacts) {
+  const MotionCurve curve(solved.clip_skin);
+  Motion points = solved.clip_points;
+  points.frames.resize(3 * contacts.vertices.size(), points.count());
+  Eigen::Matrix3Xd x, v;
+  for (Eigen::Index f = 0; f < points.count(); ++f) {
+    curve.at(static_cast<double>(f) / points.rate_hz, x, v);
+    points.at(f) = x(Eigen::all, contacts.vertices);
+  }
+  return points;
+}
+
+}  // namespace hydrostat::retarget

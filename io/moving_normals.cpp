@@ -14,6 +14,18 @@ constexpr Eigen::Index kMostTargets = 8;  // that every reader of glTF is asked 
 constexpr Eigen::Index kSamples = 64;     // frames that the targets are fitted to
 constexpr double kEnough = 0.035;         // [rad] RMS
 
+/// `vector` turned by the shortest turn that takes the unit vector `from` to the unit vector `to`; by half a turn about any
+/// axis across where they are opposite.
+Eigen::Vector3d turned(const Eigen::Vector3d& vector, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const double cosine = from.dot(to);
+  if (cosine < -1 + 1e-12) {
+    const Eigen::Vector3d axis = from.unitOrthogonal();
+    return 2 * axis.dot(vector) * axis - vector;
+  }
+  const Eigen::Vector3d axis = from.cross(to), across = axis.cross(vector);
+  return vector + across + axis.cross(across) / (1 + cosine);
+}
+
 /// The normals of the drawn vertices, each once however many share it.
 class Normals {
  public:
@@ -57,8 +69,7 @@ class Normals {
     Eigen::VectorXd result(3 * count());
     for (Eigen::Index n = 0; n < count(); ++n) {
       const Eigen::Vector3d& bind = bind_[static_cast<std::size_t>(n)];
-      result.segment<3>(3 * n) =
-          Eigen::Quaterniond::FromTwoVectors(surface_bind_.col(n), now.col(n)).toRotationMatrix() * bind - bind;
+      result.segment<3>(3 * n) = turned(bind, surface_bind_.col(n), now.col(n)) - bind;
     }
     return result;
   }

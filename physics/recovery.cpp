@@ -1,6 +1,5 @@
 #include "physics/recovery.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -9,6 +8,7 @@
 #include "physics/elastic_forces.h"
 #include "physics/impulse_contact.h"
 #include "physics/internal_forces.h"
+#include "physics/material_rotation.h"
 
 namespace hydrostat::physics {
 namespace {
@@ -22,10 +22,8 @@ constexpr double kEnergy = 0.05;      // of the elastic energy [-]: from rest at
 /// The rotation, never a reflection, that turns `rest` closest to `places`, from the sum of m place rest^T (Kabsch 1976).
 template <int Dim>
 BlockOf<Dim> rotation_of(const BlockOf<Dim>& covariance) {
-  const Eigen::JacobiSVD<BlockOf<Dim>> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  BlockOf<Dim> u = svd.matrixU();
-  if (u.determinant() * svd.matrixV().determinant() < 0) u.col(Dim - 1) *= -1;
-  return u * svd.matrixV().transpose();
+  const SignedSingularValues<Dim> svd = signed_singular_values<Dim>(covariance);
+  return svd.U * svd.V.transpose();
 }
 
 template <int Dim>

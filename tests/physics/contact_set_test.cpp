@@ -121,7 +121,7 @@ TEST(ContactSet, FindsTheCornerOfABoxInTheMiddleOfAFace) {
       } else {
         box.shape = BoxOf<3>{half_extents};
       }
-      box.turn = Eigen::Quaterniond::FromTwoVectors(half_extents, Eigen::Vector3d::UnitY()).toRotationMatrix();
+      box.turn = turn_to<3>(half_extents.normalized()).transpose();
       box.place = Eigen::Vector3d(0.25, -height - half_extents.norm(), 0.3);
       int faces = 0;
       for (const ContactOf<3>& contact : contacts_at_rest(over(box), 0.06)) {

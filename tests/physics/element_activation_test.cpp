@@ -61,7 +61,7 @@ TYPED_TEST(Activation, ShapeThatFitsItIsWithoutStress) {
     const ElementConstraints constraints = make_element_constraints(mesh.nodes);
     Gradient<kDim> strain = random_nodes<kDim>(random, kDim, 0.2);
     strain = (0.5 * (strain + strain.transpose())).eval();
-    const Eigen::SelfAdjointEigenSolver<Gradient<kDim>> modes(strain);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(strain);
     const Gradient<kDim> stretch =
         modes.eigenvectors() * modes.eigenvalues().array().exp().matrix().asDiagonal() * modes.eigenvectors().transpose();
     NodeMatrix<kDim> bend = 0 * mesh.rest;

@@ -229,7 +229,8 @@ GroundOf<Dim> slope(double degrees, double friction) {
 template <int Dim>
 BlockOf<Dim> turn_to(const VectorOf<Dim>& up) {
   if constexpr (Dim == 3) {
-    return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), up).toRotationMatrix();
+    const Eigen::Vector3d axis = Eigen::Vector3d::UnitY().cross(up);  // as long as the angle's sine, of a unit vector
+    return Eigen::AngleAxisd(std::atan2(axis.norm(), up.y()), axis.stableNormalized()).toRotationMatrix();
   } else {
     return BlockOf<Dim>{{up.y(), up.x()}, {-up.x(), up.y()}};
   }

@@ -47,6 +47,21 @@ void add_elastic_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, co
 }
 
 template <int Dim>
+double damping_work(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& from,
+                    const ConstPointsOf<Dim>& to) {
+  double sum = 0;
+  for (int e = 0; e < body.edge_count(); ++e) {
+    const int i = body.edges(0, e), j = body.edges(1, e);
+    const VectorOf<Dim> span = x.col(j) - x.col(i);
+    const double length_squared = span.squaredNorm();
+    if (length_squared == 0) continue;
+    const double along = (to.col(j) - to.col(i) - from.col(j) + from.col(i)).dot(span);
+    sum += 0.5 * body.edge_damping[e] * along * along / length_squared;
+  }
+  return sum;
+}
+
+template <int Dim>
 void add_damping_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& v,
                         PointsOf<Dim>& force) {
   for (int e = 0; e < body.edge_count(); ++e) {
@@ -81,6 +96,8 @@ void add_internal_forces(const BodyOf<Dim>& body, const StateOf<Dim>& state, con
   template double elastic_energy<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const Eigen::VectorXd&);     \
   template void add_elastic_forces<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const Eigen::VectorXd&,    \
                                         PointsOf<Dim>&);                                                          \
+  template double damping_work<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const ConstPointsOf<Dim>&,     \
+                                    const ConstPointsOf<Dim>&);                                                   \
   template void add_damping_forces<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const ConstPointsOf<Dim>&, \
                                         PointsOf<Dim>&);                                                          \
   template void add_internal_forces<Dim>(const BodyOf<Dim>&, const StateOf<Dim>&, const Eigen::VectorXd&, PointsOf<Dim>&);

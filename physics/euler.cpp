@@ -131,14 +131,7 @@ class EulerStepper final : public StepperOf<Dim> {
     for (int i = 0; i < body.node_count(); ++i) {
       sum += 0.5 * body.mass[i] * (x.col(i) - foreseen_.col(i)).squaredNorm() / (dt * dt);
     }
-    for (int e = 0; e < body.edge_count(); ++e) {
-      const int i = body.edges(0, e), j = body.edges(1, e);
-      const VectorOf<Dim> span = start_.x.col(j) - start_.x.col(i);
-      const double length_squared = span.squaredNorm();
-      if (length_squared == 0) continue;
-      const double along = (x.col(j) - x.col(i) - span).dot(span);
-      sum += 0.5 * body.edge_damping[e] * along * along / (length_squared * dt);
-    }
+    sum += damping_work<Dim>(body, start_.x, start_.x, x) / dt;
     return contact_.is_needed() ? sum + contact_.potential(x) : sum;
   }
 

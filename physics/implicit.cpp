@@ -19,6 +19,7 @@ constexpr int kSlow = 12;         // a step of more iterations makes the next on
 // smaller and smaller parts.
 constexpr int kFreeUpdates = 3;
 constexpr double kShorterUpdate = 0.7;
+constexpr int kMostTurns = 8;  // of the dashpots: where that is not enough a little angular momentum is lost, never energy won
 // A node's residual force is told as the velocity that it would give the node in a step, in sqrt(g D): what a body of 1 mm and
 // one of 100 m have in common.
 constexpr double kResidual = 2e-6;      // [-] small enough: a turning body loses angular momentum by it
@@ -35,7 +36,8 @@ constexpr double kRounding = 1e-12;  // of the potential [-]: a smaller decrease
 /// made anew where convergence is slow.
 ///
 /// Internal forces are those of the middle x_m = (x0 + x1) / 2, so they change neither momentum nor angular momentum, but for
-/// what the solver leaves (kResidual). Dashpots pull along the edges of the middle, too. Contact comes in two impulses, one
+/// what the solver leaves (kResidual). Dashpots pull along the edges of the middle, too, so that they only ever take energy: as
+/// friction limits do, these directions follow the iterates, for no potential has them. Contact comes in two impulses, one
 /// before the motion and one after it: the first keeps the places at the end of the step out of the obstacles, a stiff spring
 /// on x1 with anchored friction as in euler, booked where the step starts; the second, booked where it ends, takes away what
 /// velocity of touching places still approaches or slides. A body at rest thus has no velocity, and both impulses together
@@ -54,9 +56,10 @@ class ImplicitStepper final : public StepperOf<Dim> {
         size_(size_of_volume<Dim>(scene.body.rest_volume.sum())),
         speed_(std::sqrt(kGravity * size_)),
         inverse_mass_(inverse_masses(scene.body)),
-        ones_(Eigen::VectorXd::Ones(scene.body.edge_count())),
         foreseen_(scene.body.rest),
+        damped_(scene.body.rest),
         middle_(scene.body.rest),
+        moved_(scene.body.rest),
         trial_(scene.body.rest),
         force_(scene.body.rest),
         residual_(scene.body.rest),
@@ -66,10 +69,6 @@ class ImplicitStepper final : public StepperOf<Dim> {
         whole_start_(start_),
         part_(make_impulses(scene)),
         longest_substep_(kLongestSubstep * std::sqrt(size_ / kGravity)) {
-    dashpots_.mass = scene.body.mass;
-    dashpots_.edges = scene.body.edges;
-    dashpots_.rest_length = scene.body.rest_length;
-    dashpots_.edge_stiffness = scene.body.edge_damping;
     for (Pair& pair : pairs_) pair = {direction_, direction_, 0};
   }
 
@@ -128,10 +127,8 @@ class ImplicitStepper final : public StepperOf<Dim> {
       if (effect_force != nullptr) foreseen_.col(i) += (0.5 * dt * dt / body.mass[i]) * effect_force->col(i);
     }
     for (const int node : body.held) foreseen_.col(node) = state.x.col(node);
-    if (forces_.has_dashpots()) {
-      middle_ = start_.x + 0.5 * dt * start_.v;
-      lay_dashpots();
-    }
+    damped_ = start_.x + 0.5 * dt * start_.v;
+    turns_ = 0;
     if (contact_.is_needed()) {
       contact_.begin(start_, foreseen_, dt, reach());
       contact_.update_friction(state.x);
@@ -148,27 +145,10 @@ class ImplicitStepper final : public StepperOf<Dim> {
     return 2 * farthest + kReach * size_;
   }
 
-  /// A dashpot pulls at c n_m . (s1 - s0) / h = (2 c / h) (l_m - n_m . s0), s the span and n_m its direction in the middle: a
-  /// spring whose rest length is n_m . s0. With the n_m that the solver finds it only ever takes energy, for the pull's work
-  /// is -c (|s1|^2 - |s0|^2)^2 / (4 h l_m^2).
-  void lay_dashpots() {
-    const BodyOf<Dim>& body = scene_.body;
-    dashpots_.edge_stiffness = (2 / dt_) * body.edge_damping;
-    for (int e = 0; e < body.edge_count(); ++e) {
-      const int i = body.edges(0, e), j = body.edges(1, e);
-      const VectorOf<Dim> along = middle_.col(j) - middle_.col(i);
-      const double length = along.norm();
-      dashpots_.rest_length[e] = length > 0 ? along.dot(start_.x.col(j) - start_.x.col(i)) / length : 0;
-    }
-  }
-
-  /// What the potential takes as given, friction limits and rest lengths of dashpots, as it is at `x`.
+  /// What the potential takes as given, friction limits and directions of dashpots, as it is at `x`.
   void update_given(const PointsOf<Dim>& x) {
     if (contact_.is_needed()) contact_.update_friction(x);
-    if (forces_.has_dashpots()) {
-      middle_ = 0.5 * (start_.x + x);
-      lay_dashpots();
-    }
+    if (++turns_ <= kMostTurns) damped_ = 0.5 * (start_.x + x);
   }
 
   /// What the step minimises over the places at its end [J].
@@ -176,7 +156,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
     ++work_.passes;
     middle_ = 0.5 * (start_.x + x);
     double sum = 2 * forces_.elastic_energy(middle_);
-    if (forces_.has_dashpots()) sum += 2 * elastic_energy<Dim>(dashpots_, middle_, ones_);
+    if (forces_.has_dashpots()) sum += damping_work<Dim>(scene_.body, damped_, start_.x, x) / dt_;
     for (int i = 0; i < scene_.body.node_count(); ++i) {
       sum += scene_.body.mass[i] * (x.col(i) - foreseen_.col(i)).squaredNorm() / (dt_ * dt_);
     }
@@ -190,7 +170,10 @@ class ImplicitStepper final : public StepperOf<Dim> {
     middle_ = 0.5 * (start_.x + x);
     force_.setZero();
     forces_.add_elastic_forces(middle_, force_);
-    if (forces_.has_dashpots()) add_elastic_forces<Dim>(dashpots_, middle_, ones_, force_);
+    if (forces_.has_dashpots()) {
+      moved_ = (x - start_.x) / dt_;
+      add_damping_forces<Dim>(body, damped_, moved_, force_);
+    }
     residual_.setZero();
     if (contact_.is_needed()) contact_.add_forces(x, residual_);
     for (int i = 0; i < body.node_count(); ++i) {
@@ -253,7 +236,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
     matrix_.set_zero();
     matrix_.add_mass(scene_.body, 2 / (dt_ * dt_));
     forces_.add_stiffness(middle_, 0.5, matrix_);
-    if (forces_.has_dashpots()) matrix_.add_stiffness(dashpots_, middle_, ones_, 0.5);
+    if (forces_.has_dashpots()) matrix_.add_damping(scene_.body, damped_, 1 / dt_);
     if (contact_.is_needed()) contact_.add_stiffness(x, 1, matrix_);
     matrix_.hold(scene_.body.held);
     has_matrix_ = matrix_.factor();
@@ -349,15 +332,16 @@ class ImplicitStepper final : public StepperOf<Dim> {
   SystemMatrixOf<Dim> matrix_;
   PenaltyContact<Dim> contact_;
   double size_, speed_, dt_ = 0;  // [m], [m/s], [s]
-  Eigen::VectorXd inverse_mass_, ones_;
-  BodyOf<Dim> dashpots_;    // as springs of this step
+  Eigen::VectorXd inverse_mass_;
   PointsOf<Dim> foreseen_;  // [m] where velocities, gravity and effects alone take the nodes
-  PointsOf<Dim> middle_, trial_, force_, residual_, last_residual_;
+  PointsOf<Dim> damped_;    // [m] along whose edges the dashpots pull
+  PointsOf<Dim> middle_, moved_, trial_, force_, residual_, last_residual_;
   Eigen::VectorXd direction_;
   StateOf<Dim> start_, whole_start_;  // of a substep; of the step
   ImpulsesOf<Dim> part_;
   double longest_substep_;  // [s]
   std::array<Pair, kMemory> pairs_;
+  int turns_ = 0;                     // of the dashpots in this step
   int count_ = 0, since_matrix_ = 0;  // pairs since they were last cleared; iterations since the matrix was made
   bool has_matrix_ = false;
   StepWork work_;

@@ -123,6 +123,18 @@ TYPED_TEST(ElasticForces, LeaveItToDashpotsToBrakeAllButRigidMotion) {
   }
 }
 
+TYPED_TEST(ElasticForces, OfDashpotsTakeTwiceTheirPotential) {
+  constexpr int Dim = TypeParam::kDim;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    Deformed<Dim> d = deformed<Dim>(seed);
+    add_damping_forces<Dim>(d.body, d.state.x, d.state.v, d.force);
+    const PointsOf<Dim> to = d.body.rest + d.state.v;
+    const double taken = -d.force.cwiseProduct(d.state.v).sum();
+    EXPECT_GT(taken, 0);
+    EXPECT_NEAR(2 * damping_work<Dim>(d.body, d.state.x, d.body.rest, to) / taken, 1, 1e-12) << "seed " << seed;
+  }
+}
+
 TYPED_TEST(ElasticForces, HaveAnEnergyThatDoesNotChangeWhenTheBodyIsTurnedAndMoved) {
   constexpr int Dim = TypeParam::kDim;
   for (unsigned seed = 0; seed < kSeeds; ++seed) {

@@ -21,8 +21,7 @@ struct AskedLevel {
 void add_level_options(CLI::App& app, AskedLevel& asked);
 
 /// The levels of a creature that were asked for, the finest first: one number of nodes, or those that the budget allows.
-/// Throws UsageError, which tells what is possible, for a budget that no level meets, and Error where the creature has no
-/// rig.bin.
+/// Throws UsageError, which tells what is possible, for a budget that no level meets.
 std::vector<retarget::LevelCost> levels_within(const AskedLevel& asked, const std::string& command,
                                                const io::LoadedCreature& creature, const retarget::Rig& rig,
                                                const retarget::ReplayOptions& replay);

@@ -47,7 +47,7 @@ void add_elastic_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, co
 }
 
 template <int Dim>
-double damping_work(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& from,
+double damping_potential(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& from,
                     const ConstPointsOf<Dim>& to) {
   double sum = 0;
   for (int e = 0; e < body.edge_count(); ++e) {
@@ -96,7 +96,7 @@ void add_internal_forces(const BodyOf<Dim>& body, const StateOf<Dim>& state, con
   template double elastic_energy<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const Eigen::VectorXd&);     \
   template void add_elastic_forces<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const Eigen::VectorXd&,    \
                                         PointsOf<Dim>&);                                                          \
-  template double damping_work<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const ConstPointsOf<Dim>&,     \
+  template double damping_potential<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const ConstPointsOf<Dim>&,     \
                                     const ConstPointsOf<Dim>&);                                                   \
   template void add_damping_forces<Dim>(const BodyOf<Dim>&, const ConstPointsOf<Dim>&, const ConstPointsOf<Dim>&, \
                                         PointsOf<Dim>&);                                                          \

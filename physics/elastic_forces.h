@@ -23,7 +23,7 @@ void add_damping_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, co
 /// Half of what the dashpots of edges that lie as in `x` take times the time [J s] while the nodes go from `from` to `to`: over
 /// that time the potential of their forces with respect to `to`.
 template <int Dim>
-double damping_work(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& from,
+double damping_potential(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& from,
                     const ConstPointsOf<Dim>& to);
 
 /// Elastic forces and dashpots in one pass over the edges, as the explicit step wants them.

@@ -131,7 +131,7 @@ class EulerStepper final : public StepperOf<Dim> {
     for (int i = 0; i < body.node_count(); ++i) {
       sum += 0.5 * body.mass[i] * (x.col(i) - foreseen_.col(i)).squaredNorm() / (dt * dt);
     }
-    sum += damping_work<Dim>(body, start_.x, start_.x, x) / dt;
+    sum += damping_potential<Dim>(body, start_.x, start_.x, x) / dt;
     return contact_.is_needed() ? sum + contact_.potential(x) : sum;
   }
 

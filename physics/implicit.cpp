@@ -156,7 +156,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
     ++work_.passes;
     middle_ = 0.5 * (start_.x + x);
     double sum = 2 * forces_.elastic_energy(middle_);
-    if (forces_.has_dashpots()) sum += damping_work<Dim>(scene_.body, damped_, start_.x, x) / dt_;
+    if (forces_.has_dashpots()) sum += damping_potential<Dim>(scene_.body, damped_, start_.x, x) / dt_;
     for (int i = 0; i < scene_.body.node_count(); ++i) {
       sum += scene_.body.mass[i] * (x.col(i) - foreseen_.col(i)).squaredNorm() / (dt_ * dt_);
     }

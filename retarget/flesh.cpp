@@ -22,7 +22,7 @@ constexpr double kGroundReach = 0.03;   // of L: skin that comes as near to the 
 constexpr double kOwned = 0.1;          // share of a node's bone weights from which on it has regard to a bone
 constexpr double kPoissonsRatio = 0.45;
 constexpr double kGravity = 9.81;       // [m/s2] that kFleshSoftness is about
-constexpr double kMostShear = 0.6;      // of the skin's flesh, in Frobenius' norm: below 1 nothing turns inside out
+constexpr double kMostShear = 0.8;      // of the skin's flesh, in Frobenius' norm: below 1 nothing turns inside out
 
 /// A straight piece of a bone.
 struct BonePiece {

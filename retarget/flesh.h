@@ -22,11 +22,10 @@ Flesh make_flesh(const Performer& performer, const Rig& rig);
 /// kFleshSoftness.
 Wobble flesh_modes(const Performer& performer, const Rig& rig, const Flesh& flesh, Eigen::Index count);
 
-/// rho g L / E of flesh [-], as CreatureOptions.softness is of the body, which bears itself and is 200 times stiffer: at
-/// L = 1 m a Young's modulus of 9.8 kPa. Of fat and of relaxed muscle some 2 to 3 kPa were measured (three times the shear
-/// moduli of "Strain-dependent shear properties of human adipose tissue in vivo", J. Mech. Behav. Biomed. Mater., 2023), and
-/// 26 kPa of fat under light pressure ("Young's moduli of subcutaneous tissues and muscles under different loads at the
-/// gluteal region", J. Phys. Ther. Sci. 34, 2022).
-constexpr double kFleshSoftness = 1;
+/// rho g L / E of flesh [-], as CreatureOptions.softness is of the body, which bears itself and is 40 times stiffer: at
+/// L = 1 m a Young's modulus of 49 kPa. It lies between what was measured of skin with fat, 26 kPa, and of muscle, 62 kPa,
+/// under light pressure: "Young's moduli of subcutaneous tissues and muscles under different loads at the gluteal region
+/// calculated using ultrasonography", Journal of Physical Therapy Science 34, 2022.
+constexpr double kFleshSoftness = 0.2;
 
 }  // namespace hydrostat::retarget

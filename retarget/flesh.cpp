@@ -17,6 +17,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kFinest = 4000;        // nodes that the finer mesh is meant to have, at most
+constexpr double kMostPlaces = 20000;   // of its lattice, filled or not
 constexpr double kInner = 0.5;          // share of the way from bone to skin that goes with the bone
 constexpr double kGroundReach = 0.03;   // of L: skin that comes as near to the ground does not swing
 constexpr double kOwned = 0.1;          // share of a node's bone weights from which on it has regard to a bone
@@ -101,9 +102,10 @@ class SurfaceDistance {
 Eigen::Vector3i finer_lattice(const ControlMesh& mesh, const SkinnedMesh& skin) {
   const Eigen::Matrix<double, 3, 4> tet = mesh.nodes(Eigen::all, mesh.tets.col(0));  // spans its cell
   const Eigen::Vector3d cell = tet.rowwise().maxCoeff() - tet.rowwise().minCoeff();
-  const double finer = std::clamp(std::cbrt(kFinest / static_cast<double>(mesh.nodes.cols())), 1.0, 2.0);
   const Eigen::Vector3d extent = skin.vertices.rowwise().maxCoeff() - skin.vertices.rowwise().minCoeff();
-  return (finer * extent.array() / cell.array()).round().max(1).cast<int>();
+  const Eigen::Vector3d cells = (extent.array() / cell.array()).round().max(1);
+  const double room = std::min(kFinest / static_cast<double>(mesh.nodes.cols()), kMostPlaces / cells.prod());
+  return (std::clamp(std::cbrt(room), 1.0, 2.0) * cells).array().round().cast<int>();
 }
 
 void hold_inside(const Rig& rig, const std::vector<BonePiece>& pieces, Flesh& flesh) {

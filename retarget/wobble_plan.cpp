@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "retarget/cpu_seconds.h"
+#include "retarget/error.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -71,6 +72,17 @@ Wobble off_because(const std::string& reason) {
   return off;
 }
 
+/// All modes that are looked at; a body that no finer mesh can be made of has none.
+Wobble modes_of(const Performer& performer, const Rig& rig) {
+  try {
+    Wobble modes = flesh_modes(performer, rig, make_flesh(performer, rig), kSought);
+    if (!modes.is_on()) modes.reason = "bones and ground hold all of the body, so that no flesh swings";
+    return modes;
+  } catch (const Error& error) {
+    return off_because("no finer mesh can be made of the skin: " + std::string(error.what()));
+  }
+}
+
 std::string told(const char* format, double share, const Wobble& wobble) {
   char text[240];
   if (wobble.is_on()) {
@@ -96,8 +108,8 @@ double farthest_wobble(const Wobble& wobble, const Eigen::MatrixXd& amplitudes) 
 
 Wobble plan_wobble(const Performer& performer, const Rig& rig, Wish wish) {
   if (wish == Wish::kOff) return off_because("turned off by --wobble");
-  Wobble all = flesh_modes(performer, rig, make_flesh(performer, rig), kSought);
-  if (!all.is_on()) return off_because("bones and ground hold all of the body, so that no flesh swings");
+  Wobble all = modes_of(performer, rig);
+  if (!all.is_on()) return all;
   Eigen::MatrixXd amplitudes = target_amplitudes(performer, all);
   const double least = wish == Wish::kOn ? 0 : kLeastShare * kSeen * performer.length;
   const std::vector<Eigen::Index> modes = driven_modes(amplitudes, least);

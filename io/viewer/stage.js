@@ -164,6 +164,7 @@ export class Stage {
     mesh.frustumCulled = false;
     this.scene.add(mesh);
     const body = { motion, mesh, visible: ['clip', 'target', 'replay'].includes(motion.role) };
+    if (motion.morphs) body.morphs = new Morphs(motion.morphs, this.skin, this.rest);
     if (motion.role === 'replay' && this.told_looks) {
       body.looks = new Looks(this.told_looks, kRoles.replay.colour, () => this.draw());
       material.visible = false;
@@ -287,7 +288,7 @@ export class Stage {
       attribute.array.set(positions);
     } else {
       embed(positions, this.skin, attribute.array);
-      this.morphs?.put_on(t, positions, (body.turns ??= new Map()), attribute.array);
+      for (const morphs of [this.morphs, body.morphs]) morphs?.put_on(t, positions, (body.turns ??= new Map()), attribute.array);
     }
     if (body.looks) return body.looks.move(attribute.array);
     attribute.needsUpdate = true;

@@ -14,9 +14,9 @@ const [kind, kept_file, readme, ...measured] = process.argv.slice(2);
 
 /** Rows of a CSV file as objects; a field may stand in quotes. */
 function read_csv(file) {
-  const [head, ...lines] = readFileSync(file, 'utf8').trim().split('\n').map((line) =>
-    [...line.matchAll(/("([^"]*)"|([^,"]*))(,|$)/g)].map((field) => field[2] ?? field[3]));
-  return lines.map((line) => Object.fromEntries(head.map((name, k) => [name, line[k] ?? ''])));
+  const [head, ...lines] = readFileSync(file, 'utf8').trim().split('\n').map((text) =>
+    [...text.matchAll(/("([^"]*)"|([^,"]*))(,|$)/g)].map((field) => field[2] ?? field[3]));
+  return lines.map((fields) => Object.fromEntries(head.map((name, k) => [name, fields[k] ?? ''])));
 }
 
 function write_whole(file, text) {
@@ -24,10 +24,9 @@ function write_whole(file, text) {
   renameSync(`${file}.part`, file);
 }
 
-function write_csv(file, rows) {
-  const names = Object.keys(rows[0]);
+function write_csv(file, names, rows) {
   const field = (value) => (`${value}`.includes(',') ? `"${value}"` : `${value}`);
-  write_whole(file, [names, ...rows.map((row) => names.map((name) => row[name]))].map((line) => `${line.map(field).join(',')}\n`).join(''));
+  write_whole(file, [names, ...rows.map((row) => names.map((name) => row[name]))].map((fields) => `${fields.map(field).join(',')}\n`).join(''));
 }
 
 /** Kept rows, in their places those measured that have the same key, behind them the other ones. */
@@ -39,7 +38,8 @@ function merged(kept, fresh, key_of) {
 
 const short = (value, digits) => (value >= 10 ** digits ? `${Math.round(value)}` : `${Number(value.toPrecision(digits))}`);
 const as_power = (value) => value.toExponential(1).replace(/e([+-])(\d)$/, 'e$10$2').replace('e+0', 'e').replace('e+', 'e');
-const markdown = (head, rows) => [head, head.map(() => '---'), ...rows].map((row) => `| ${row.join(' | ')} |`).join('\n');
+const line = (cells) => `|${cells.map((cell) => (cell === '' ? ' ' : ` ${cell} `)).join('|')}|`;
+const markdown = (head, rows) => [head, head.map(() => '---'), ...rows].map(line).join('\n');
 
 /** A row of the levels' table from a report; NAME.LEVEL.json. */
 function level_row(file) {
@@ -59,7 +59,7 @@ function levels_table(rows) {
   return markdown(['creature', 'nodes', 'counted work, ms a frame', 'skin from the clip, % L', "of the clip's way"], rows.map((row) => {
     const name = row.creature === creature ? '' : `\`${row.creature}\``;
     creature = row.creature;
-    const nodes = row.nodes === row.solved_nodes ? `**${row.nodes}**` : row.nodes;
+    const nodes = Number(row.nodes) === Number(row.solved_nodes) ? `**${row.nodes}**` : row.nodes;
     const outcome = Number(row.falls) ? ['falls', ''] :
       [(100 * row.clip_shape_rms_length).toFixed(1), row.way === '' ? 'on the spot' : `${Math.round(100 * row.way)} %`];
     return [name, nodes, short(Number(row.work_ms), 2), ...outcome];
@@ -98,27 +98,36 @@ function import_table(rows) {
 }
 
 const kinds = {
-  levels: {read: (files) => files.map(level_row).sort((a, b) => a.nodes - b.nodes), key: (row) => row.creature, table: levels_table},
+  levels: {
+    columns: ['creature', 'nodes', 'solved_nodes', 'work_ms', 'falls', 'clip_shape_rms_length', 'way'],
+    read: (files) => files.map(level_row).sort((a, b) => a.nodes - b.nodes), key: (row) => row.creature, table: levels_table,
+  },
   peers: {
+    columns: ['scene', 'tets', 'solver', 'steps_per_s', 'cpu_ms_per_s', 'times_of_bullet_60', 'rms_error_m', 'angular_loss'],
     read: (files) => files.flatMap(read_csv).filter((row) => row.cpu_ms_per_s !== ''), table: peers_table,
     key: (row) => `${row.scene}/${row.tets}/${row.solver}/${row.steps_per_s}`,
   },
-  damping: {read: (files) => files.flatMap(read_csv), key: (row) => row.body, table: damping_table},
-  import: {read: (files) => files.flatMap(read_csv), key: (row) => row.file, table: import_table},
+  damping: {
+    columns: ['body', 'damping_time_s', 'youngs_modulus_pa', 'explicit_ms_per_s', 'implicit_ms_per_s'],
+    read: (files) => files.flatMap(read_csv), key: (row) => row.body, table: damping_table,
+  },
+  import: {
+    columns: ['file', 'bytes', 'read_wall_s', 'read_cpu_s', 'read_peak_mib', 'import_s'],
+    read: (files) => files.flatMap(read_csv).filter((row) => row.bytes !== ''), key: (row) => row.file, table: import_table,
+  },
 };
 
 if (kind === 'speed') {
   if (measured.length > 0) write_whole(kept_file, readFileSync(measured[0], 'utf8'));
   write_between_marks(readme, 'samples/figures.sh speed', readFileSync(kept_file, 'utf8').trimEnd());
 } else if (kinds[kind]) {
-  const {read, key, table} = kinds[kind];
+  const {columns, read, key, table} = kinds[kind];
   const rows = merged(existsSync(kept_file) ? read_csv(kept_file) : [], read(measured), key);
   if (rows.length === 0) {
     console.error(`figures.mjs: ${kept_file}: holds nothing to show. Measure it first.`);
     process.exit(1);
   }
-  for (const row of rows) for (const name of Object.keys(row)) row[name] = `${row[name]}`;
-  if (measured.length > 0) write_csv(kept_file, rows);
+  if (measured.length > 0) write_csv(kept_file, columns, rows);
   write_between_marks(readme, `samples/figures.sh ${kind}`, table(rows));
   if (kind === 'levels') write_whole(kept_file.replace(/csv$/, 'svg'), levels_svg(rows));
 } else {

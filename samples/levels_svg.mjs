@@ -1,5 +1,5 @@
 // The picture of levels of detail: what coarser and finer bodies of one creature keep, over what they cost.
-const kWidth = 860, kHeight = 380, kTop = 78, kBottom = 52, kPanel = 290, kLefts = [64, 464]; // [px]
+const kWidth = 790, kHeight = 396, kTop = 94, kBottom = 52, kPanel = 290, kLefts = [64, 464]; // [px]
 const kColours = ['#1f6fb4', '#d2691e', '#2c9a4b', '#a033cc', '#b5372f', '#7a6a1f'];
 
 const px = (value) => Number(value.toFixed(1));
@@ -38,33 +38,37 @@ function panel(rows, creatures, left, x_ticks, y_label, value_of) {
   svg += `<text x="${left + kPanel / 2}" y="${kHeight - 14}" text-anchor="middle">counted work [ms for a frame of 1/60 s]</text>\n`;
   svg += `<text transform="translate(${left - 48} ${(kTop + floor) / 2}) rotate(-90)" text-anchor="middle">${y_label}</text>\n`;
   creatures.forEach((creature, k) => {
-    const own = rows.filter((row) => row.creature === creature), told = own.filter((row) => value_of(row) !== null);
-    const places = told.map((row) => [x(row.work_ms), y(value_of(row)), row]);
-    svg += `<polyline fill="none" stroke="${kColours[k % kColours.length]}" stroke-width="1.5" points="${places.map(([a, b]) => `${a},${b}`).join(' ')}"/>\n`;
-    for (const [a, b, row] of places) {
+    const own = rows.filter((row) => row.creature === creature);
+    const places = own.map((row) => (value_of(row) === null ? null : [x(row.work_ms), y(value_of(row)), row]));
+    const pieces = places.map((place, n) => (place ? `${places[n - 1] ? 'L' : 'M'}${place[0]} ${place[1]}` : '')).join('');  // a fall breaks the line
+    svg += `<path fill="none" stroke="${kColours[k % kColours.length]}" stroke-width="1.5" d="${pieces}"/>\n`;
+    for (const [a, b, row] of places.filter(Boolean)) {
       const about = `<title>${escaped(creature)}, ${row.nodes} nodes: ${value_of(row).toFixed(1)} %</title>`;
       svg += `<circle cx="${a}" cy="${b}" r="3.5" fill="${kColours[k % kColours.length]}">${about}</circle>`;
       if (row.nodes === row.solved_nodes) svg += `<circle cx="${a}" cy="${b}" r="7" fill="none" stroke="${kColours[k % kColours.length]}"/>`;
       svg += '\n';
     }
-    for (const row of own.filter((other) => Number(other.falls))) {
+    for (const row of own.filter((other) => other.falls)) {
       svg += `<text x="${x(row.work_ms)}" y="${kTop + 12}" text-anchor="middle" font-size="14" fill="${kColours[k % kColours.length]}">&#215;<title>${escaped(creature)}, ${row.nodes} nodes: falls</title></text>\n`;
     }
   });
   return svg;
 }
 
-/** rows: creature, nodes, solved_nodes, work_ms, falls, clip_shape_rms_length, way; all as text. */
-export function levels_svg(rows) {
+/** rows: creature, nodes, solved_nodes, work_ms, falls, clip_shape_rms_length, way; numbers, or text of numbers. */
+export function levels_svg(told) {
+  const number = (value) => (value === '' ? '' : Number(value));
+  const rows = told.map((row) => Object.fromEntries(Object.entries(row).map(([name, value]) => [name, name === 'creature' ? value : number(value)])));
   const creatures = [...new Set(rows.map((row) => row.creature))];
-  const x_ticks = log_ticks(rows.map((row) => Number(row.work_ms)));
-  const share = (name) => (row) => (row[name] === '' ? null : 100 * Number(row[name]));
+  const x_ticks = log_ticks(rows.map((row) => row.work_ms));
+  const share = (name) => (row) => (row[name] === '' ? null : 100 * row[name]);
   let svg = `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${kWidth} ${kHeight}" role="img" font-family="sans-serif" font-size="11">` +
     '<rect width="100%" height="100%" fill="#fff"/>\n<text x="8" y="20" font-size="14" font-weight="bold">Levels of detail: one solved creature on coarser and finer bodies</text>\n' +
-    '<text x="8" y="38">To the right a body has more nodes and costs more. Left, lower is nearer to the clip; right, 100 % keeps all of its way. Ringed: the body that was solved; &#215;: it falls.</text>\n';
+    '<text x="8" y="38">To the right a body has more nodes and costs more. Left, lower is nearer to the clip; right, 100 % keeps all of its way.</text>\n' +
+    '<text x="8" y="53">Ringed: the body that the signals were solved on. &#215;: it falls.</text>\n';
   let along = 8;
   creatures.forEach((creature, k) => {
-    svg += `<circle cx="${along + 4}" cy="54" r="4" fill="${kColours[k % kColours.length]}"/><text x="${along + 12}" y="58">${escaped(creature)}</text>\n`;
+    svg += `<circle cx="${along + 4}" cy="71" r="4" fill="${kColours[k % kColours.length]}"/><text x="${along + 12}" y="75">${escaped(creature)}</text>\n`;
     along += 40 + 6.2 * creature.length;
   });
   svg += panel(rows, creatures, kLefts[0], x_ticks, 'skin from the clip [% of L, RMS]', share('clip_shape_rms_length'));

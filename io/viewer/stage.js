@@ -228,7 +228,7 @@ export class Stage {
     if (this.is_scene) this.focus.set(...(this.whole?.centre ?? start));
     this.controls.target.copy(this.focus);
     this.camera_way = new Vector3(0.45 * hx - hz, 0.42, 0.45 * hz + hx).normalize();
-    if (this.is_flat) this.camera_way.set(0.12, 0.16, 1).normalize();
+    if (this.is_flat) this.camera_way.set(...(this.performers.length > 1 ? [0.8, 0.7, 1] : [0.12, 0.16, 1])).normalize(); // side by side is one behind the other
     this.set_distance();
   }
 

@@ -3,7 +3,8 @@
 #   scenes    pictures of the scenes' accuracy and effects                          minutes
 #   creature  the trot's own curve of accuracy                                      half an hour
 #   levels    levels of detail, table and picture (clips that are not ours from HYDROSTAT_ASSETS, where they are there)  an hour
-#   speed     what the stages of a conversion cost, and what reading the samples does    minutes
+#   speed     what the stages of a conversion cost                                  minutes
+#   import    what reading the samples costs                                        seconds
 #   damping   explicit against implicit over damping and stiffness (installs what tests/bench/run.sh wants)   a quarter of an hour
 #   peers     our methods against Bullet's (the same)                               a quarter of an hour
 #   stability the suite of hard scenes: hours, and therefore only where it is named
@@ -74,6 +75,8 @@ run_levels() {
 run_speed() {
   "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --quiet > "$out/speed.txt"
   table speed txt "$out/speed.txt"
+}
+run_import() {
   "$hydrostat" bench import "$project/samples" -o "$out/import" > /dev/null
   table import csv "$out/import/import.csv"
 }
@@ -93,10 +96,10 @@ run_draw() {
   done
 }
 
-[ $# -gt 0 ] || set -- scenes creature levels speed damping peers
+[ $# -gt 0 ] || set -- scenes creature levels speed import damping peers
 for what; do
   [ "$(type -t "run_$what")" = function ] || {
-    echo "figures.sh: '$what' is nothing that it makes. Name scenes, creature, levels, speed, damping, peers, stability or draw." >&2
+    echo "figures.sh: '$what' is nothing that it makes. Name scenes, creature, levels, speed, import, damping, peers, stability or draw." >&2
     exit 2
   }
 done

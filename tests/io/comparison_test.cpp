@@ -146,7 +146,8 @@ TEST_F(ComparisonOf, ThePageShowsEveryRunWithItsOwnBodyAndOpensInABrowser) {
 TEST_F(ComparisonOf, ImagesFromElsewhereAreLeftOut) {
   const std::string first = page("first");
   std::string text = read_file(page("second"));
-  text.replace(text.find("\"body\":"), 7, R"("looks":{"parts":[],"materials":[],"images":["http://example.org/a.png","data:image/png;base64,AA=="]},"body":)");
+  text.insert(text.find("\"body\":{\"nodes\":\""),
+              R"("looks":{"parts":[],"materials":[],"images":["http://example.org/a.png","data:image/png;base64,AA=="]},)");
   const std::string second = (directory_.path / "second.html").string();
   write_file(second, text);
   write_comparison_page(out(), compare_runs({first, second}));

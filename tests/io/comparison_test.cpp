@@ -171,7 +171,9 @@ TEST_F(ComparisonOf, DamagedPagesAreRefused) {
   }
   for (const auto& [pointer, value] : std::vector<std::pair<const char*, Json>>{{"/schema", "hydrostat.page/9"},
                                                                                 {"/skin/nodes", "AAAA"},
-                                                                                {"/skin/triangles", "/////////////////w=="},
+                                                                                {"/skin/nodes", base64(std::vector<unsigned char>(64, 1))},
+                                                                                {"/skin/triangles", base64(std::vector<unsigned char>(24, 0xff))},
+                                                                                {"/skin/weights", base64(std::vector<unsigned char>(64, 0xff))},
                                                                                 {"/motions/2/step", 0},
                                                                                 {"/motions/2/corners", "!"},
                                                                                 {"/motions/2/rate_hz", -1},

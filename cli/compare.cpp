@@ -59,12 +59,15 @@ std::string table(const io::Comparison& comparison) {
 std::string distance_line(const io::Comparison& comparison, std::size_t k) {
   const io::RunDistance& distance = comparison.distances[k];
   const std::string &name = comparison.runs[k + 1].name, &first = comparison.runs.front().name;
-  if (!distance.obstacle.empty()) return name + ": its skin is not held against that of " + first + ": " + distance.obstacle + "\n";
+  if (!distance.obstacle.empty())
+    return name + ": its skin is not held against that of " + first + ": " + distance.obstacle + "\n";
   const retarget::SkinDistance& course = distance.course;
-  const io::DistanceSummary whole = io::summary_of(course.distance_m, course.time_s), shape = io::summary_of(course.shape_m, course.time_s);
+  const io::DistanceSummary whole = io::summary_of(course.distance_m, course.time_s),
+                            shape = io::summary_of(course.shape_m, course.time_s);
   const double percent = 100 / comparison.length_m;
   char text[200];
-  std::snprintf(text, sizeof text, "%.3g %% of L (RMS over %.3g s; at most %.3g %%, at %.2f s), %.3g %% without place and turn\n",
+  std::snprintf(text, sizeof text,
+                "%.3g %% of L (RMS over %.3g s; at most %.3g %%, at %.2f s), %.3g %% without place and turn\n",
                 percent * whole.rms_m, course.time_s[course.time_s.size() - 1], percent * whole.most_m, whole.most_time_s,
                 percent * shape.rms_m);
   return name + ": its skin is away from that of " + first + " by " + text;
@@ -74,7 +77,8 @@ UsageError usage(const std::string& what, const std::string& mend) { return {kCo
 
 void check_subjects(const std::vector<std::string>& subjects) {
   if (subjects.size() < 2) throw usage("there is nothing to compare with", "Name two creatures or more.");
-  if (subjects.size() > kMost) throw usage("more than " + std::to_string(kMost) + " are too many for one page", "Name fewer.");
+  if (subjects.size() > kMost)
+    throw usage("more than " + std::to_string(kMost) + " are too many for one page", "Name fewer.");
   std::vector<fs::path> places;
   for (const std::string& subject : subjects) {
     places.push_back(fs::weakly_canonical(subject));
@@ -88,13 +92,15 @@ void check_subjects(const std::vector<std::string>& subjects) {
 int compare(const CompareCommand& command) {
   check_subjects(command.subjects);
   if (!command.out.empty() && fs::path(command.out).extension() != ".html") {
-    throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .html", "The comparison is written as a page.");
+    throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .html",
+                     "The comparison is written as a page.");
   }
   const io::Comparison comparison = io::compare_runs(command.subjects);
   if (!command.out.empty()) {
     for (const io::ComparedRun& run : comparison.runs) {
       if (fs::weakly_canonical(run.page.file) != fs::weakly_canonical(command.out)) continue;
-      throw UsageError(kCommand, "option --out", "'" + command.out + "' is one of the pages that are compared", "Name another file.");
+      throw UsageError(kCommand, "option --out", "'" + command.out + "' is one of the pages that are compared",
+                       "Name another file.");
     }
     io::write_comparison_page(command.out, comparison);
   }
@@ -112,7 +118,8 @@ int compare(const CompareCommand& command) {
 void add_compare(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<CompareCommand>();
   CLI::App* sub = app.add_subcommand("compare", "Motions of creatures or scenes side by side, with their figures");
-  sub->add_option("DIR", command->subjects, "Creatures, directories of 'simulate', or report pages; the others are held against the first")
+  sub->add_option("DIR", command->subjects,
+                  "Creatures, directories of 'simulate', or report pages; the others are held against the first")
       ->required();
   sub->add_option("-o,--out", command->out, "Write a page with all motions, to this .html file");
   sub->add_flag("--json", command->json, "Print the comparison as JSON");

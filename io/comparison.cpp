@@ -12,18 +12,45 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// What is compared of the reports: groups and names of report.json. "replay" is the main run, or a scene's simulation.
-constexpr std::pair<const char*, const char*> kFigures[] = {
-    {"body", "nodes"}, {"body", "elements"}, {"level", "solved_nodes"}, {"level", "work_ms"}, {"accuracy", "method"},
-    {"accuracy", "element"}, {"accuracy", "material"}, {"accuracy", "dt_s"}, {"signals", "harmonics"},
-    {"signals", "error_rms_l0"}, {"accuracy", "max_error_length"}, {"accuracy", "estimated_error_length"},
-    {"accuracy", "work_saved"}, {"timing_s", "total"}, {"replay", "real_time_factor"}, {"replay", "ms_per_sim_s"},
-    {"replay", "duration_s"}, {"replay", "cycles"}, {"replay", "fell"}, {"replay", "fall_time_s"}, {"replay", "fall_cause"},
-    {"replay", "diverged"}, {"replay", "diverged_cause"}, {"replay", "clip_shape_rms_length"}, {"replay", "shape_rms_length"},
-    {"replay", "world_rms_length"}, {"replay", "drift_per_cycle_length"}, {"replay", "heading_deg_per_cycle"},
-    {"replay", "travel_per_cycle_length"}, {"replay", "clip_travel_per_cycle_length"}, {"replay", "travel_length"},
-    {"replay", "slip_per_stance_length"}, {"replay", "sole_gap_length"}, {"replay", "penetration_max_size"},
-    {"replay", "volume_error_max"}, {"replay", "momentum_residual_mg"}, {"replay", "correction_rms"}, {"replay", "style_range"},
-    {"replay", "guard_steps"}};
+constexpr std::pair<const char*, const char*> kFigures[] = {{"body", "nodes"},
+                                                            {"body", "elements"},
+                                                            {"level", "solved_nodes"},
+                                                            {"level", "work_ms"},
+                                                            {"accuracy", "method"},
+                                                            {"accuracy", "element"},
+                                                            {"accuracy", "material"},
+                                                            {"accuracy", "dt_s"},
+                                                            {"signals", "harmonics"},
+                                                            {"signals", "error_rms_l0"},
+                                                            {"accuracy", "max_error_length"},
+                                                            {"accuracy", "estimated_error_length"},
+                                                            {"accuracy", "work_saved"},
+                                                            {"timing_s", "total"},
+                                                            {"replay", "real_time_factor"},
+                                                            {"replay", "ms_per_sim_s"},
+                                                            {"replay", "duration_s"},
+                                                            {"replay", "cycles"},
+                                                            {"replay", "fell"},
+                                                            {"replay", "fall_time_s"},
+                                                            {"replay", "fall_cause"},
+                                                            {"replay", "diverged"},
+                                                            {"replay", "diverged_cause"},
+                                                            {"replay", "clip_shape_rms_length"},
+                                                            {"replay", "shape_rms_length"},
+                                                            {"replay", "world_rms_length"},
+                                                            {"replay", "drift_per_cycle_length"},
+                                                            {"replay", "heading_deg_per_cycle"},
+                                                            {"replay", "travel_per_cycle_length"},
+                                                            {"replay", "clip_travel_per_cycle_length"},
+                                                            {"replay", "travel_length"},
+                                                            {"replay", "slip_per_stance_length"},
+                                                            {"replay", "sole_gap_length"},
+                                                            {"replay", "penetration_max_size"},
+                                                            {"replay", "volume_error_max"},
+                                                            {"replay", "momentum_residual_mg"},
+                                                            {"replay", "correction_rms"},
+                                                            {"replay", "style_range"},
+                                                            {"replay", "guard_steps"}};
 
 /// A member of an object, or null where there is none.
 const Json& member(const Json& object, const char* key) {
@@ -58,7 +85,9 @@ void read_figures(ComparedRun& run) {
 /// Takes out what no run has.
 void drop_empty_figures(std::vector<ComparedRun>& runs) {
   for (std::size_t k = runs.front().figures.size(); k-- > 0;) {
-    const auto is_empty = [k](const ComparedRun& run) { return std::holds_alternative<std::monostate>(run.figures[k].second); };
+    const auto is_empty = [k](const ComparedRun& run) {
+      return std::holds_alternative<std::monostate>(run.figures[k].second);
+    };
     if (!std::all_of(runs.begin(), runs.end(), is_empty)) continue;
     for (ComparedRun& run : runs) run.figures.erase(run.figures.begin() + static_cast<std::ptrdiff_t>(k));
   }
@@ -91,7 +120,8 @@ std::string clip_of(const ComparedRun& run) {
 /// Why the skins of two runs cannot be held against each other; empty where they can.
 std::string obstacle_between(const ComparedRun& first, const ComparedRun& other) {
   const auto quoted = [](const std::string& text) { return "'" + text + "'"; };
-  if (clip_of(first) != clip_of(other)) return "it plays another clip, " + quoted(clip_of(other)) + " and not " + quoted(clip_of(first));
+  if (clip_of(first) != clip_of(other))
+    return "it plays another clip, " + quoted(clip_of(other)) + " and not " + quoted(clip_of(first));
   const Eigen::Index own = first.page.embedding.count(), others = other.page.embedding.count();
   if (own != others) return "its skin has " + std::to_string(others) + " vertices and not " + std::to_string(own);
   const Eigen::Matrix3Xi &a = first.page.triangles, &b = other.page.triangles;
@@ -144,7 +174,8 @@ Json distance_json(const Comparison& comparison, std::size_t k) {
     return json;
   }
   const retarget::SkinDistance& course = distance.course;
-  const DistanceSummary whole = summary_of(course.distance_m, course.time_s), shape = summary_of(course.shape_m, course.time_s);
+  const DistanceSummary whole = summary_of(course.distance_m, course.time_s),
+                        shape = summary_of(course.shape_m, course.time_s);
   json["duration_s"] = course.time_s[course.time_s.size() - 1];
   json["rms_length"] = whole.rms_m / comparison.length_m;
   json["most_length"] = whole.most_m / comparison.length_m;
@@ -157,7 +188,10 @@ Json distance_json(const Comparison& comparison, std::size_t k) {
 }
 
 Json as_json(const Comparison& comparison) {
-  Json json{{"schema", "hydrostat.comparison/1"}, {"length_m", comparison.length_m}, {"runs", Json::array()}, {"distances", Json::array()}};
+  Json json{{"schema", "hydrostat.comparison/1"},
+            {"length_m", comparison.length_m},
+            {"runs", Json::array()},
+            {"distances", Json::array()}};
   for (const ComparedRun& run : comparison.runs) json["runs"].push_back(run_json(run));
   for (std::size_t k = 0; k < comparison.distances.size(); ++k) json["distances"].push_back(distance_json(comparison, k));
   return json;

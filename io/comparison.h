@@ -45,8 +45,9 @@ DistanceSummary summary_of(const Eigen::VectorXd& distance, const Eigen::VectorX
 /// Schema hydrostat.comparison/1 (README, "compare --json").
 std::string comparison_json(const Comparison& comparison);
 
-/// Writes one self-contained page: all motions in one view with one clock, figures and differences, and curves of the distance
-/// between the skins and of what the reports' own diagrams show of each run. Throws Error when the file cannot be written.
+/// Writes one self-contained page: all motions in one view with one clock, figures and differences, and curves of the
+/// distance between the skins and of what the reports' own diagrams show of each run. Throws Error when the file cannot be
+/// written.
 void write_comparison_page(const std::filesystem::path& path, const Comparison& comparison);
 
 }  // namespace hydrostat::io

@@ -40,7 +40,8 @@ bool read_motion(const Json& told, Eigen::Index nodes, retarget::Motion& motion)
   const double step = told.at("step").get<double>();
   motion.rate_hz = told.at("rate_hz").get<double>();
   if (!(motion.rate_hz > 0) || !(step > 0) || told.at("loop").get<bool>() || told.at("of_skin").get<bool>()) return false;
-  if (!unpack<float>(told.at("corners"), corners, 3) || !unpack<std::uint16_t>(told.at("steps"), steps, 3 * nodes)) return false;
+  if (!unpack<float>(told.at("corners"), corners, 3) || !unpack<std::uint16_t>(told.at("steps"), steps, 3 * nodes))
+    return false;
   if (corners.cols() != steps.cols() || !corners.allFinite()) return false;
   motion.frames = step * steps + corners.replicate(nodes, 1);
   return motion.frames.allFinite();
@@ -62,7 +63,8 @@ bool read_parts(PageData& page) {
   if (json.at("schema") != "hydrostat.page/1" || !json.at("report").is_object()) return false;
   Eigen::MatrixXd rest;
   const Json& skin = json.at("skin");
-  if (!unpack<float>(json.at("body").at("nodes"), rest, 3) || !unpack<std::uint32_t>(skin.at("nodes"), page.embedding.nodes, 4) ||
+  if (!unpack<float>(json.at("body").at("nodes"), rest, 3) ||
+      !unpack<std::uint32_t>(skin.at("nodes"), page.embedding.nodes, 4) ||
       !unpack<float>(skin.at("weights"), page.embedding.weights, 4) ||
       !unpack<std::uint32_t>(skin.at("triangles"), page.triangles, 3)) {
     return false;
@@ -80,7 +82,8 @@ bool read_parts(PageData& page) {
 std::filesystem::path report_page_of(const std::filesystem::path& subject) {
   if (subject.extension() == ".html" && std::filesystem::is_regular_file(subject)) return subject;
   if (!is_creature(subject)) {
-    throw Error(subject.string(), "", "is no creature and no report page", "Make one with 'hydrostat convert' or 'hydrostat simulate'.");
+    throw Error(subject.string(), "", "is no creature and no report page",
+                "Make one with 'hydrostat convert' or 'hydrostat simulate'.");
   }
   const std::filesystem::path page = subject / "report.html";
   if (!std::filesystem::is_regular_file(page)) throw Error(page.string(), "", "is missing", kMend);

@@ -13,8 +13,9 @@ class Compare : public testing::Test {
   static void SetUpTestSuite() {
     directory_ = std::make_unique<TemporaryDirectory>();
     for (const char* method : {"explicit", "implicit", "xpbd"}) {
-      const Outcome outcome = hydrostat_in(directory_->path, "simulate '" HYDROSTAT_SAMPLES "/scenes/bouncing_circle.toml' -o " +
-                                                                 std::string(method) + " --duration 1.5 --quiet --method " + method);
+      const Outcome outcome =
+          hydrostat_in(directory_->path, "simulate '" HYDROSTAT_SAMPLES "/scenes/bouncing_circle.toml' -o " +
+                                             std::string(method) + " --duration 1.5 --quiet --method " + method);
       ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     }
   }
@@ -31,7 +32,8 @@ TEST_F(Compare, HoldsMotionsAgainstTheFirstInTableJsonAndPage) {
   for (const char* text : {"accuracy.method", "implicit: its skin is away from that of explicit by ", "xpbd: its skin"}) {
     EXPECT_NE(told.out.find(text), std::string::npos) << text << "\n" << told.out;
   }
-  EXPECT_EQ(std::system(("bash '" HYDROSTAT_TESTS "/page.sh' '" + (directory_->path / "page.html").string() + "'").c_str()), 0);
+  EXPECT_EQ(std::system(("bash '" HYDROSTAT_TESTS "/page.sh' '" + (directory_->path / "page.html").string() + "'").c_str()),
+            0);
   const Outcome json_told = compare("explicit implicit xpbd --json");
   const auto json = nlohmann::json::parse(json_told.out);
   EXPECT_EQ(json["schema"], "hydrostat.comparison/1");
@@ -61,14 +63,16 @@ TEST_F(Compare, RefusesWhatCannotBeCompared) {
          "absent: is no creature and no report page. Make one with 'hydrostat convert' or 'hydrostat simulate'.");
   std::filesystem::copy(directory_->path / "xpbd", directory_->path / "bare", std::filesystem::copy_options::recursive);
   std::filesystem::remove(directory_->path / "bare" / "report.html");
-  expect("explicit bare", 1, "bare/report.html: is missing. Make it again with 'hydrostat replay' ('simulate' for a scene).");
+  expect("explicit bare", 1,
+         "bare/report.html: is missing. Make it again with 'hydrostat replay' ('simulate' for a scene).");
   EXPECT_FALSE(std::filesystem::exists(directory_->path / "page.png"));
 }
 
 TEST_F(Compare, NamesRunsByWhatTellsThemApart) {
   for (const char* place : {"a", "b"}) {
     std::filesystem::create_directory(directory_->path / place);
-    std::filesystem::copy(directory_->path / "xpbd", directory_->path / place / "disc", std::filesystem::copy_options::recursive);
+    std::filesystem::copy(directory_->path / "xpbd", directory_->path / place / "disc",
+                          std::filesystem::copy_options::recursive);
   }
   const auto json = nlohmann::json::parse(compare("explicit a/disc b/disc --json").out);
   EXPECT_EQ(json["runs"][0]["name"], "explicit");

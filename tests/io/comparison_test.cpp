@@ -139,7 +139,8 @@ TEST_F(ComparisonOf, ThePageShowsEveryRunWithItsOwnBodyAndOpensInABrowser) {
   EXPECT_TRUE(has_height);
   EXPECT_EQ(data["charts"][0]["curves"][0]["rank"], 1);  // the second run's colour
   const std::string text = read_file(out());
-  for (const char* outside : {"src=\"http", "href=\"http", "@import", "<script src"}) EXPECT_EQ(text.find(outside), std::string::npos) << outside;
+  for (const char* outside : {"src=\"http", "href=\"http", "@import", "<script src"})
+    EXPECT_EQ(text.find(outside), std::string::npos) << outside;
   EXPECT_EQ(std::system(("bash '" HYDROSTAT_TESTS "/page.sh' '" + out() + "'").c_str()), 0);
 }
 
@@ -161,23 +162,27 @@ TEST_F(ComparisonOf, DamagedPagesAreRefused) {
     write_file(file, text);
     return refusal([&] { read_page(file); });
   };
-  const std::string damaged = file + "||is damaged or of another version|Make it again with 'hydrostat replay' ('simulate' for a scene).";
+  const std::string damaged =
+      file + "||is damaged or of another version|Make it again with 'hydrostat replay' ('simulate' for a scene).";
   Json data = data_of(page("whole"));
-  const auto with = [](const Json& json) { return "<script type=\"application/json\" id=\"data\">" + json.dump() + "</script>"; };
+  const auto with = [](const Json& json) {
+    return "<script type=\"application/json\" id=\"data\">" + json.dump() + "</script>";
+  };
   for (const char* key : {"schema", "report", "skin", "body", "motions"}) {
     Json less = data;
     less.erase(key);
     EXPECT_EQ(refused(with(less)), damaged) << key;
   }
-  for (const auto& [pointer, value] : std::vector<std::pair<const char*, Json>>{{"/schema", "hydrostat.page/9"},
-                                                                                {"/skin/nodes", "AAAA"},
-                                                                                {"/skin/nodes", base64(std::vector<unsigned char>(64, 1))},
-                                                                                {"/skin/triangles", base64(std::vector<unsigned char>(24, 0xff))},
-                                                                                {"/skin/weights", base64(std::vector<unsigned char>(64, 0xff))},
-                                                                                {"/motions/2/step", 0},
-                                                                                {"/motions/2/corners", "!"},
-                                                                                {"/motions/2/rate_hz", -1},
-                                                                                {"/motions/2/steps", 7}}) {
+  for (const auto& [pointer, value] :
+       std::vector<std::pair<const char*, Json>>{{"/schema", "hydrostat.page/9"},
+                                                 {"/skin/nodes", "AAAA"},
+                                                 {"/skin/nodes", base64(std::vector<unsigned char>(64, 1))},
+                                                 {"/skin/triangles", base64(std::vector<unsigned char>(24, 0xff))},
+                                                 {"/skin/weights", base64(std::vector<unsigned char>(64, 0xff))},
+                                                 {"/motions/2/step", 0},
+                                                 {"/motions/2/corners", "!"},
+                                                 {"/motions/2/rate_hz", -1},
+                                                 {"/motions/2/steps", 7}}) {
     Json other = data;
     other[Json::json_pointer(pointer)] = value;
     EXPECT_EQ(refused(with(other)), damaged) << pointer;

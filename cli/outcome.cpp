@@ -11,6 +11,7 @@
 #include "io/write_file.h"
 #include "retarget/body_material.h"
 #include "retarget/effects.h"
+#include "retarget/wobble_plan.h"
 
 namespace hydrostat::cli {
 
@@ -41,13 +42,15 @@ void write_outcome(io::CreatureWriter& writer, const retarget::Performer& perfor
                    const io::AccuracyCurve* curve) {
   const retarget::Replay& run = performances.main();
   const bool down = !report.outcome_ok;
+  const retarget::MovingMorphs wobble = retarget::wobble_morphs(performer, run.motion);
+  const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, wobble);
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
-                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &performer.morphs},
+                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
                         performer.mesh, performer.scene.body.mass, run.motion, {});
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));
   io::write_performance_page(writer.directory() / "report.html", performer, appearance, signals, performances, report,
-                             curve_picture(writer, report, curve));
+                             curve_picture(writer, report, curve), wobble);
   if (curve != nullptr) write_curve(writer, *curve);
 }
 

@@ -42,6 +42,20 @@ Json quantised(const retarget::Motion& motion, Eigen::Index stride) {
   return {{"frames", corners.size() / 3}, {"step", step}, {"corners", packed(corners)}, {"steps", packed(steps)}};
 }
 
+Json morphs_json(const retarget::MovingMorphs& morphs) {
+  Json json{{"targets", Json::array()},
+            {"weights", packed_as<float>(morphs.weights)},
+            {"frames", morphs.weights.cols()},
+            {"rate_hz", morphs.rate_hz},
+            {"loop", morphs.loop}};
+  for (const retarget::MorphTarget& target : morphs.targets) {
+    json["targets"].push_back({{"name", target.name},
+                               {"vertices", packed_as<std::uint32_t>(target.vertices)},
+                               {"offsets", packed_as<float>(target.offsets)}});
+  }
+  return json;
+}
+
 Json motion_json(const PageMotion& shown) {
   const retarget::Motion& motion = shown.motion;
   const double most = shown.of_skin ? kSkinRate : kNodeRate;
@@ -54,6 +68,7 @@ Json motion_json(const PageMotion& shown) {
   json["duration_s"] = motion.duration_s();
   json["travel"] = {motion.travel.x(), motion.travel.y(), motion.travel.z()};
   json["yaw"] = motion.yaw;
+  if (!shown.morphs.targets.empty()) json["morphs"] = morphs_json(shown.morphs);
   return json;
 }
 
@@ -128,20 +143,6 @@ Json looks_json(const Appearance& appearance) {
     json["parts"].push_back(std::move(told));
   }
   for (const Material& material : appearance.materials) json["materials"].push_back(material_json(material));
-  return json;
-}
-
-Json morphs_json(const retarget::MovingMorphs& morphs) {
-  Json json{{"targets", Json::array()},
-            {"weights", packed_as<float>(morphs.weights)},
-            {"frames", morphs.weights.cols()},
-            {"rate_hz", morphs.rate_hz},
-            {"loop", morphs.loop}};
-  for (const retarget::MorphTarget& target : morphs.targets) {
-    json["targets"].push_back({{"name", target.name},
-                               {"vertices", packed_as<std::uint32_t>(target.vertices)},
-                               {"offsets", packed_as<float>(target.offsets)}});
-  }
   return json;
 }
 

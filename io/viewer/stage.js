@@ -170,6 +170,7 @@ export class Stage {
     this.scene.add(mesh);
     const is_replay = motion.role === 'replay';
     const body = { motion, performer, mesh, is_main: is_replay && !motion.performer, visible: is_replay || ['clip', 'target'].includes(motion.role) };
+    if (motion.morphs) body.morphs = new Morphs(motion.morphs, performer.skin, performer.rest);
     if (is_replay && performer.looks) {
       body.looks = new Looks(performer.looks, colour, () => this.draw());
       mesh.add(...body.looks.meshes);
@@ -306,7 +307,7 @@ export class Stage {
       attribute.array.set(positions);
     } else {
       embed(positions, skin, attribute.array);
-      morphs?.put_on(t, positions, (body.turns ??= new Map()), attribute.array);
+      for (const worn of [morphs, body.morphs]) worn?.put_on(t, positions, (body.turns ??= new Map()), attribute.array);
     }
     if (body.wears_looks) return body.looks.move(attribute.array);
     attribute.needsUpdate = true;

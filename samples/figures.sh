@@ -73,7 +73,7 @@ run_levels() {
   table levels csv "${reports[@]}"
 }
 run_speed() {
-  "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --quiet > "$out/speed.txt"
+  "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --nodes 150 --duration 1 --quiet > "$out/speed.txt"
   table speed txt "$out/speed.txt"
 }
 run_import() {

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures and the measured tables of README anew:  samples/figures.sh [WHAT...]
 #   scenes    pictures of the scenes' accuracy and effects                          minutes
-#   creature  the trot's own curve of accuracy                                      half an hour
+#   creature  the trot's own curve of accuracy                                      a quarter of an hour
 #   levels    levels of detail, table and picture (clips that are not ours from HYDROSTAT_ASSETS, where they are there)  an hour
 #   speed     what the stages of a conversion cost                                  minutes
 #   import    what reading the samples costs                                        seconds
@@ -60,7 +60,7 @@ run_scenes() {
 }
 run_creature() {
   make_creature boxdog_trot "$project/samples/boxdog_trot.fbx"
-  "$hydrostat" bench accuracy "$out/boxdog_trot" -o "$out/trot" --max-error 2% --own-mesh --quiet
+  "$hydrostat" bench accuracy "$out/boxdog_trot" -o "$out/trot" --max-error 2% --own-mesh --duration 0.2 --quiet
   cp -- "$out/trot/accuracy.svg" "$figures/accuracy_boxdog_trot.svg"
 }
 run_levels() {
@@ -73,7 +73,7 @@ run_levels() {
   table levels csv "${reports[@]}"
 }
 run_speed() {
-  "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --quiet > "$out/speed.txt"
+  "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --nodes 150 --duration 1 --quiet > "$out/speed.txt"
   table speed txt "$out/speed.txt"
 }
 run_import() {

@@ -34,8 +34,8 @@ constexpr double kWobbleDamping = 0.15;
 /// Source: Nigam and Jennings, "Calculation of response spectra from strong-motion earthquake records", BSSA 59, 1969.
 Eigen::Vector2d oscillated(const Eigen::Vector2d& from, double w, double d, double h, double a0, double a1);
 
-/// The loads [m/s2] that a motion of the control nodes, 3N x F, drives the modes by, K x F, mean_load not taken out: gravity less acceleration
-/// at each node, in the frame that the node's neighbours have turned by.
+/// The loads [m/s2] that a motion of the control nodes, 3N x F, drives the modes by, K x F, mean_load not taken out: gravity
+/// less acceleration at each node, in the frame that the node's neighbours have turned by.
 Eigen::MatrixXd wobble_loads(const Wobble& wobble, const Performer& performer, const Motion& motion);
 
 /// Amplitudes [m] of the modes, K x F, from `wobble.start` on, as the oscillators have them: not limited.

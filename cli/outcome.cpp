@@ -8,6 +8,7 @@
 #include "io/gltf_out.h"
 #include "io/performance_page.h"
 #include "io/report.h"
+#include "io/write_file.h"
 #include "retarget/body_material.h"
 #include "retarget/effects.h"
 #include "retarget/wobble_plan.h"
@@ -25,6 +26,17 @@ void report_replays(const retarget::Performances& performances, retarget::RunRep
   report.outcome_ok = !is_down(performances.main()) && report.accuracy.is_met();
 }
 
+namespace {
+
+/// The picture of the curve; where nothing was chosen now, that of the choice before, which holds for the creature's own mesh.
+std::string curve_picture(const io::CreatureWriter& writer, const retarget::RunReport& report, const io::AccuracyCurve* curve) {
+  if (curve != nullptr) return io::accuracy_svg(*curve);
+  const std::filesystem::path kept = writer.directory() / "accuracy.svg";
+  return !report.level && std::filesystem::is_regular_file(kept) ? io::read_file(kept) : "";
+}
+
+}  // namespace
+
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
                    const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report,
                    const io::AccuracyCurve* curve) {
@@ -38,7 +50,7 @@ void write_outcome(io::CreatureWriter& writer, const retarget::Performer& perfor
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));
   io::write_performance_page(writer.directory() / "report.html", performer, appearance, signals, performances, report,
-                             curve == nullptr ? "" : io::accuracy_svg(*curve), wobble);
+                             curve_picture(writer, report, curve), wobble);
   if (curve != nullptr) write_curve(writer, *curve);
 }
 

@@ -363,6 +363,7 @@ TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
   const std::string motion = motion_bytes(creature);
   hydrostat_in(directory.path, "replay creature --quiet");
   EXPECT_EQ(motion_bytes(creature), motion);
+  EXPECT_NE(io::read_file(creature / "report.html").find("What accuracy costs: "), std::string::npos);
 }
 
 TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {

@@ -14,7 +14,9 @@ function cell(runs) {
   const guarded = Math.max(...runs.map((row) => Number(row[8] || 0)));
   const failures = [...new Set(runs.filter((row) => !passed(row)).map((row) => `${row[2]} ${row[4]}: ${row[5]}`))];
   const guard = guarded >= 0.0005 ? `, guard ${guarded < 0.01 ? '< 1' : `up to ${Math.round(100 * guarded)}`} %` : '';
-  return runs.every((row) => row[5] === 'refused') ? 'refused' : `${well} of ${runs.length}${guard}${failures.length ? `; ${failures.join('; ')}` : ''}`;
+  const refused = runs.filter((row) => row[5] === 'refused').length;
+  if (refused === runs.length) return 'refused';
+  return `${well} of ${runs.length}${refused ? `, ${refused} by refusal` : ''}${guard}${failures.length ? `; ${failures.join('; ')}` : ''}`;
 }
 
 const table = [

@@ -97,7 +97,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
       {"embedding", "on", "the skin follows the nodes of its tets; counted at 60 frames a second, outside the solver",
        ms(embedding * kFramesPerSecond)},
       {"wobble", "off", "not simulated in this version: the skin has no motion of its own", 0},
-      {"fracture", "off", "not simulated in this version: the body does not tear", 0},
+      {"fracture", "off", "a creature has no seams; scenes have [[seam]]", 0},
   };
 }
 

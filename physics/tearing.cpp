@@ -48,17 +48,28 @@ SeamWatch<Dim>::SeamWatch(const FractureOf<Dim>& fracture, const BodyOf<Dim>& wh
   whole_edges_ = whole_edges(whole, rim_, rim.origin);
   if (springs) rim_ = physics::springs_alone(rim_);
   forces_.emplace(rim_);
-  const auto in_rim = [&](const SeamFace& face, std::size_t side, std::size_t k) {
-    const int node = apart.mesh.nodes(face.corners[side][k], face.elements[side]);
+  const auto in_rim = [&](int corner, int element) {
+    const int node = apart.mesh.nodes(corner, element);
     return static_cast<int>(std::lower_bound(nodes_.begin(), nodes_.end(), node) - nodes_.begin());
   };
+  const bool of_boxes = apart.mesh.nodes.rows() > Dim + 1;
   behind_.resize(fracture.seams.size());
   for (const SeamFace& from : fracture.faces) {
     Face face{from.seam, from.corner_count};
+    for (std::size_t side = 0; side < 2; ++side) {
+      const int element = from.elements[side];
+      const auto place = [&](int corner) { return apart.mesh.rest.col(apart.mesh.nodes(corner, element)); };
+      face.span[side][0] = in_rim(0, element);
+      for (int d = 0; d < Dim; ++d) {
+        const int corner = of_boxes ? 1 << d : d + 1;
+        face.span[side][static_cast<std::size_t>(d) + 1] = in_rim(corner, element);
+        face.ahead[side][d] = fracture.seams[static_cast<std::size_t>(from.seam)].normal.dot(place(corner) - place(0));
+      }
+    }
     std::vector<int>& behind = behind_[static_cast<std::size_t>(face.seam)];
     for (std::size_t k = 0; k < static_cast<std::size_t>(face.count); ++k) {
-      face.behind[k] = in_rim(from, 0, k);
-      face.front[k] = in_rim(from, 1, k);
+      face.behind[k] = in_rim(from.corners[0][k], from.elements[0]);
+      face.front[k] = in_rim(from.corners[1][k], from.elements[1]);
       if (face.behind[k] != face.front[k]) behind.push_back(face.behind[k]);
     }
     faces_.push_back(face);
@@ -100,6 +111,21 @@ void SeamWatch<Dim>::hold_together() {
   }
 }
 
+/// Of the marked plane, carried along by the elements on both sides: F^-T times that at rest. Zero where one is inside out.
+template <int Dim>
+VectorOf<Dim> SeamWatch<Dim>::normal_of(const Face& face) const {
+  VectorOf<Dim> sum = VectorOf<Dim>::Zero();
+  for (std::size_t side = 0; side < 2; ++side) {
+    BlockOf<Dim> spans;
+    for (std::size_t d = 0; d < Dim; ++d) {
+      spans.row(static_cast<Eigen::Index>(d)) = x_.col(face.span[side][d + 1]) - x_.col(face.span[side][0]);
+    }
+    if (!(spans.determinant() != 0)) return VectorOf<Dim>::Zero();
+    sum += (spans.inverse() * face.ahead[side]).normalized();
+  }
+  return sum.normalized();
+}
+
 template <int Dim>
 void SeamWatch<Dim>::measure_seam(int seam, const std::vector<char>& is_broken) {
   pull_.setZero();
@@ -123,8 +149,8 @@ void SeamWatch<Dim>::measure_seam(int seam, const std::vector<char>& is_broken) 
       pull += pull_.col(first_behind(face, k));
       area += area_.col(first_behind(face, k));
     }
-    const double squared = area.squaredNorm();
-    if (squared > 0) tension_[static_cast<Eigen::Index>(f)] = pull.dot(area) / squared;
+    const VectorOf<Dim> normal = normal_of(face);
+    if (area.dot(normal) > 0) tension_[static_cast<Eigen::Index>(f)] = pull.dot(normal) / area.dot(normal);
   }
 }
 

@@ -14,9 +14,10 @@ namespace hydrostat::physics {
 /// The elements that touch a seam are looked at with all its faces apart: what those of one side exert on their copy of a node
 /// is a free body's force. Copies that are one node move as one, so that what holds a copy c to the others is
 /// m_c / (sum m) sum f - f_c: weight, which goes with the mass, drops out. The sum of that over the nodes of a face, over the
-/// area around them (of each node a part of its whole faces), both as they now stand, is the mean traction there; what counts
-/// is its part along the area's normal, tension being positive (Cauchy's stress, normal . sigma . normal). It is exact for
-/// simplices under one stress, whatever zigzag a plane has become in the mesh. Forces are elastic ones, without the dashpots'.
+/// area around them (of each node a part of its faces), both as they now stand and along the normal that the marked plane has
+/// in the elements beside it, is the tension there (Cauchy's stress, normal . sigma . normal). It is exact for simplices under
+/// one stress along the normal, whatever zigzag the plane has become in the mesh. Forces are elastic ones, without the
+/// dashpots'.
 template <int Dim>
 class SeamWatch {
  public:
@@ -35,7 +36,12 @@ class SeamWatch {
   struct Face {
     int seam = 0, count = 0;
     std::array<int, 4> behind{}, front{};  // nodes of the rim
+    // Of the element behind and the one in front: corners that span it, and how far each but the first is before it along the
+    // seam's normal at rest [m].
+    std::array<std::array<int, Dim + 1>, 2> span{};
+    std::array<VectorOf<Dim>, 2> ahead{};
   };
+  VectorOf<Dim> normal_of(const Face& face) const;
   void hold_together();
   void measure_seam(int seam, const std::vector<char>& is_broken);
 

@@ -85,6 +85,7 @@ class Course {
   std::optional<physics::SelfContactSet<Dim>> itself_;
   const long steps_, steps_per_frame_;
   const double mass_, weight_, rest_volume_;
+  const VectorOf<Dim> centre_at_start_;
   const double energy_of_origin_;  // [J] of the whole mass in the local origin, in the field of gravity
 
   long done_ = 0;
@@ -120,6 +121,7 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       mass_(body_.mass.sum()),
       weight_(kGravity * mass_),
       rest_volume_(body_.rest_volume.sum()),
+      centre_at_start_(physics::centre_of_mass(body_, scenario.start.x)),
       energy_of_origin_(-mass_ * scene_.gravity.dot(scenario.origin)),
       state_(scenario.start),
       before_(state_),
@@ -328,7 +330,7 @@ Simulation Course<Dim>::finish() {
   report.work_mgl = work_ / (weight_ * scenario_.length);
   const Eigen::Vector3d up = in_space<Dim>(scene_.has_ground ? scene_.ground.normal : VectorOf<Dim>::UnitY());
   const Eigen::Vector3d way =
-      in_space<Dim>(physics::centre_of_mass(body_, state_.x) - physics::centre_of_mass(body_, scenario_.start.x));
+      in_space<Dim>(physics::centre_of_mass(body_, state_.x) - centre_at_start_);
   report.travel_length = (way - up * up.dot(way)).norm() / scenario_.length;
   if (report.duration_s > 0) report.ms_per_sim_s = 1000 * busy_s_ / report.duration_s;
   if (busy_s_ > 0) report.real_time_factor = report.duration_s / busy_s_;

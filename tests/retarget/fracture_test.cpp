@@ -154,6 +154,7 @@ TYPED_TEST(Fractures, LetBothPartsGoOn) {
       EXPECT_LT(run.report.angular_residual_mgl, 1e-3);
       EXPECT_LT(run.report.energy_excess_mgl, 1e-3);
       EXPECT_EQ(run.report.inverted_elements, 0);
+      EXPECT_LT(run.report.travel_length, 0.01);
       EXPECT_EQ(run.trace.mass_kg, body.mass);
       EXPECT_EQ(run.trace.position.rows(), run.motion.frames.rows());
     }

@@ -59,6 +59,7 @@ std::shared_ptr<CLI::App> command_line(int& exit_code) {
   add_signals(*app, exit_code);
   add_batch(*app, exit_code);
   add_bench(*app, exit_code);
+  add_compare(*app, exit_code);
   add_explain(*app, exit_code);
   return app;
 }

@@ -15,6 +15,7 @@
 #include "cli/outcome.h"
 #include "cli/stages.h"
 #include "cli/subcommands.h"
+#include "cli/wobble_option.h"
 #include "io/body_file.h"
 #include "io/creature_record.h"
 #include "io/fingerprint.h"
@@ -22,10 +23,12 @@
 #include "io/import.h"
 #include "io/signals_file.h"
 #include "io/stage_records.h"
+#include "io/wobble_file.h"
 #include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/flight.h"
 #include "retarget/run_warnings.h"
+#include "retarget/wobble_plan.h"
 
 namespace hydrostat::cli {
 
@@ -36,7 +39,8 @@ namespace {
 constexpr const char *kTet = "tet", *kHex = "hex";
 
 struct ConvertOptions {
-  std::string clip_file, out, clip, root_motion = "auto", limit = "auto", method = "auto", element = kTet, material = "auto";
+  std::string clip_file, out, clip, root_motion = "auto", limit = "auto", method = "auto", element = kTet, material = "auto",
+              wobble = "auto";
   double height = 0;
   int nodes = 0;
   double friction = retarget::CreatureOptions().friction;
@@ -183,6 +187,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
                      {"calibrated", options.calibrated},
                      {"method", report.accuracy.method},
                      {"friction", options.friction},
+                     {"wobble", options.wobble},
                      {"seed", std::int64_t{options.seed}}};
   for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
   if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
@@ -257,6 +262,18 @@ class Conversion {
     add_warnings(retarget::target_warnings(prepared, scene.body, inverse_options.limit, wished_limit == 0));
     add_warnings(retarget::inverse_warnings(inverse_.report));
     target_.performer = make_performer(creature_, motion_, std::move(prepared));
+    plan_wobble();
+  }
+
+  void plan_wobble() {
+    retarget::Performer& performer = target_.performer;
+    const retarget::Wish wish = wobble_wish(options_.wobble);
+    const auto plan = [&] { return retarget::plan_wobble(performer, rig(), wish); };
+    performer.wobble = wish == retarget::Wish::kOff ? plan() : stages_.run("wobble", key_after(key_, options_.wobble), plan);
+  }
+
+  retarget::Rig rig() const {
+    return {creature_.character.skeleton, creature_.character.skin, creature_.mesh.bone_weights};
   }
 
   void warn_of_flights(const retarget::PreparedTarget& prepared) {
@@ -368,7 +385,8 @@ class Conversion {
       writer_.write("target.bin", target_file_);
       if (!performer.morphs.targets.empty()) writer_.write("morphs.bin", io::morphs_bytes(performer.morphs));
       if (!appearance_.parts.empty()) writer_.write("appearance.bin", io::appearance_bytes(appearance_));
-      writer_.write("rig.bin", io::rig_bytes({creature_.character.skeleton, creature_.character.skin, creature_.mesh.bone_weights}));
+      if (performer.wobble.is_on()) writer_.write("wobble.bin", io::wobble_bytes(performer.wobble));
+      writer_.write("rig.bin", io::rig_bytes(rig()));
       writer_.write("signals.json", signals_text_);
       io::write_skinned_glb(writer_.directory() / "reference.glb",
                             {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance_,
@@ -457,6 +475,8 @@ void add_convert(CLI::App& app, int& exit_code) {
   convert_command->add_option("--friction", options->friction, "Coulomb's coefficient of the ground")
       ->check(number_within(0.05, 5))
       ->capture_default_str();
+  add_wobble_option(*convert_command, options->wobble,
+                    "Whether flesh swings over what the nodes carry, in the picture alone; auto: where it is seen");
   convert_command->add_option("--seed", options->seed, "Other than 0: the body that is let go differs from the plan by up to 2 % in "
                                                        "mass, friction and stiffness, drawn from this number")
       ->capture_default_str();

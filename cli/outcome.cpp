@@ -8,8 +8,10 @@
 #include "io/gltf_out.h"
 #include "io/performance_page.h"
 #include "io/report.h"
+#include "io/write_file.h"
 #include "retarget/body_material.h"
 #include "retarget/effects.h"
+#include "retarget/wobble_plan.h"
 
 namespace hydrostat::cli {
 
@@ -24,18 +26,31 @@ void report_replays(const retarget::Performances& performances, retarget::RunRep
   report.outcome_ok = !is_down(performances.main()) && report.accuracy.is_met();
 }
 
+namespace {
+
+/// The picture of the curve; where nothing was chosen now, that of the choice before, which holds for the creature's own mesh.
+std::string curve_picture(const io::CreatureWriter& writer, const retarget::RunReport& report, const io::AccuracyCurve* curve) {
+  if (curve != nullptr) return io::accuracy_svg(*curve);
+  const std::filesystem::path kept = writer.directory() / "accuracy.svg";
+  return !report.level && std::filesystem::is_regular_file(kept) ? io::read_file(kept) : "";
+}
+
+}  // namespace
+
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
                    const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report,
                    const io::AccuracyCurve* curve) {
   const retarget::Replay& run = performances.main();
   const bool down = !report.outcome_ok;
+  const retarget::MovingMorphs wobble = retarget::wobble_morphs(performer, run.motion);
+  const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, wobble);
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
-                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &performer.morphs},
+                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
                         performer.mesh, performer.scene.body.mass, run.motion, {});
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));
   io::write_performance_page(writer.directory() / "report.html", performer, appearance, signals, performances, report,
-                             curve == nullptr ? "" : io::accuracy_svg(*curve));
+                             curve_picture(writer, report, curve), wobble);
   if (curve != nullptr) write_curve(writer, *curve);
 }
 

@@ -12,9 +12,11 @@
 #include "cli/number_option.h"
 #include "cli/outcome.h"
 #include "cli/stages.h"
+#include "cli/wobble_option.h"
 #include "io/gltf_out.h"
 #include "io/load_creature.h"
 #include "io/trace_writer.h"
+#include "retarget/wobble_plan.h"
 
 namespace hydrostat::cli {
 
@@ -27,7 +29,7 @@ constexpr double kLongest = 600;       // [s] of a replay
 constexpr double kFastestPush = 100;   // [m/s] along an axis
 
 struct ReplayCommand {
-  std::string directory, out, trace;
+  std::string directory, out, trace, wobble;
   AskedAccuracy accuracy;
   AskedLevel level;
   double duration = 0, cycles = 0, trace_rate = 0;
@@ -105,7 +107,8 @@ int write_motion(const ReplayCommand& command, const retarget::Performer& perfor
                  const retarget::Performances& performances) {
   const retarget::Replay& run = performances.main();
   const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
-  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &performer.morphs},
+  const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, retarget::wobble_morphs(performer, run.motion));
+  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
                         performer.mesh, performer.scene.body.mass, run.motion, {});
   return tell_run(run, command.directory, file.string());
 }
@@ -185,7 +188,9 @@ int replay(const ReplayCommand& command) {
   io::LoadedCreature creature = stages.run("load", [&] { return io::load_creature(command.directory); });
   const retarget::Performer& performer = creature.target.performer;
   retarget::PerformOptions options = perform_options(command, creature);
+  const WobbleChoice wobble(command.wobble, command.level.is_asked(), command.directory, creature);
   Levels levels(command, creature, options.replay, stages);
+  wobble.plan(creature.target.performer);
   std::optional<ChosenStep> chosen;
   if (command.accuracy.is_asked()) {
     chosen = stages.run("accuracy", [&] { return choose_step(command.accuracy, kCommand, performer, creature.signals, std::nullopt); });
@@ -208,7 +213,10 @@ int replay(const ReplayCommand& command) {
     });
   };
   retarget::Performances performances = perform();
-  while (is_down(performances.main()) && levels.take_next(creature)) performances = perform();
+  while (is_down(performances.main()) && levels.take_next(creature)) {
+    wobble.plan(creature.target.performer);
+    performances = perform();
+  }
   while (chosen && !command.open_loop && is_down(performances.main()) &&
          take_next(*chosen, performer, creature.signals, creature.target.report.warnings)) {
     take_steps(options.replay, chosen->setting);
@@ -272,6 +280,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   for (const char* other : {"--max-error", "--accuracy"}) {
     replay_command->get_option("--lod")->excludes(replay_command->get_option(other));
   }
+  add_wobble_option(*replay_command, command->wobble, "See 'hydrostat convert --help' [the creature's]");
   CLI::Option* seed = replay_command->add_option("--seed", command->seed, "See 'hydrostat convert --help' [the creature's]");
   CLI::Option* trace = replay_command->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
   replay_command->add_option("--trace-rate", command->trace_rate, "Rows a second, a whole part of the 120 of the control")

@@ -17,6 +17,7 @@ void add_simulate(CLI::App& app, int& exit_code);
 void add_signals(CLI::App& app, int& exit_code);
 void add_batch(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
+void add_compare(CLI::App& app, int& exit_code);
 void add_explain(CLI::App& app, int& exit_code);
 
 }  // namespace hydrostat::cli

@@ -3,6 +3,7 @@
 #include "io/body_file.h"
 #include "io/creature_directory.h"
 #include "io/signals_file.h"
+#include "io/wobble_file.h"
 #include "io/write_file.h"
 #include "retarget/error.h"
 #include "retarget/self_contact_plan.h"
@@ -38,6 +39,17 @@ bool signals_fit_body(const retarget::SignalSet& signals, const physics::Body& b
   return signals.nodes.cols() == body.edges.cols() && signals.nodes == body.edges;
 }
 
+/// Where there is no wobble.bin it is off, for the reason that creature.toml tells.
+retarget::Wobble load_wobble(const std::filesystem::path& creature, const LoadedCreature& loaded) {
+  const std::filesystem::path file = creature / "wobble.bin";
+  if (std::filesystem::exists(file)) return parse_wobble(read_file(file), file.string(), loaded.target.performer);
+  retarget::Wobble wobble;
+  for (const CreatureRecord::Effect& effect : loaded.record.effects) {
+    if (effect.name == "wobble") wobble.reason = effect.reason;
+  }
+  return wobble;
+}
+
 }  // namespace
 
 LoadedCreature load_creature(const std::filesystem::path& creature) {
@@ -66,6 +78,7 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
     loaded.target.performer.morphs =
         parse_morphs(read_file(morphs_file), morphs_file.string(), loaded.target.performer.skin.vertices.cols());
   }
+  loaded.target.performer.wobble = load_wobble(creature, loaded);
   retarget::SelfContactPlan plan = retarget::plan_self_contact(loaded.target.performer);
   loaded.target.performer.scene.self_contact = std::move(plan.settings);
   loaded.target.performer.self_contact_reason = std::move(plan.reason);

@@ -126,7 +126,7 @@ std::vector<PageContactRow> contact_rows(const retarget::PreparedTarget& prepare
 void write_performance_page(const std::filesystem::path& path, const retarget::Performer& performer,
                             const Appearance& appearance, const retarget::SignalSet& signals,
                             const retarget::Performances& performances, const retarget::RunReport& report,
-                            const std::string& curve) {
+                            const std::string& curve, const retarget::MovingMorphs& wobble) {
   const std::vector<Run> runs = runs_of(performances);
   PageInput page{report, performer.skin, performer.embedding, performer.mesh, {}, {}, {}, 0};
   page.appearance = &appearance;
@@ -134,6 +134,7 @@ void write_performance_page(const std::filesystem::path& path, const retarget::P
   page.motions.push_back({PageRole::kClip, true, performer.clip_skin});
   page.motions.push_back({PageRole::kTarget, false, performer.prepared.target});
   for (const Run& run : runs) page.motions.push_back({run.role, false, run.replay.motion});
+  page.motions[2].morphs = wobble;  // the main run is the first
   using Course = retarget::ReplayCourse;
   page.charts = {com_path(runs),
                  com_height(runs),

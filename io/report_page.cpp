@@ -5,12 +5,10 @@
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
-#include <span>
 
 #include "io/images.h"
+#include "io/page_json.h"
 #include "io/report.h"
-#include "io/viewer_bundle.h"
-#include "io/write_file.h"
 
 namespace hydrostat::io {
 namespace {
@@ -20,53 +18,6 @@ using Json = nlohmann::ordered_json;
 constexpr double kNodeRate = 60;  // [Hz]
 constexpr std::size_t kMostImageBytes = std::size_t{16} << 20;
 constexpr double kSkinRate = 30;  // [Hz]: vertices are many, and the view interpolates
-
-/// Source: RFC 4648, section 4.
-std::string base64(std::span<const unsigned char> bytes) {
-  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t present = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < present ? bytes[i + k] : 0u);
-    for (std::size_t k = 0; k < 4; ++k) text += k <= present ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
-template <typename Number>
-std::string packed(const std::vector<Number>& values) {
-  return base64({reinterpret_cast<const unsigned char*>(values.data()), values.size() * sizeof(Number)});
-}
-
-template <typename Number, typename Derived>
-std::string packed_as(const Eigen::DenseBase<Derived>& values) {
-  std::vector<Number> numbers;
-  numbers.reserve(static_cast<std::size_t>(values.size()));
-  for (Eigen::Index c = 0; c < values.cols(); ++c) {
-    for (Eigen::Index r = 0; r < values.rows(); ++r) numbers.push_back(static_cast<Number>(values(r, c)));
-  }
-  return packed(numbers);
-}
-
-const char* role_name(PageRole role) {
-  switch (role) {
-    case PageRole::kClip:
-      return "clip";
-    case PageRole::kTarget:
-      return "target";
-    case PageRole::kReplay:
-      return "replay";
-    case PageRole::kOpenLoop:
-      return "open_loop";
-    case PageRole::kNaive:
-      return "naive";
-    case PageRole::kOther:
-      break;
-  }
-  return "other";
-}
 
 /// Every frame's positions as 16-bit steps from that frame's own least corner, so that travel costs no precision. All frames
 /// share the step [m].
@@ -91,6 +42,20 @@ Json quantised(const retarget::Motion& motion, Eigen::Index stride) {
   return {{"frames", corners.size() / 3}, {"step", step}, {"corners", packed(corners)}, {"steps", packed(steps)}};
 }
 
+Json morphs_json(const retarget::MovingMorphs& morphs) {
+  Json json{{"targets", Json::array()},
+            {"weights", packed_as<float>(morphs.weights)},
+            {"frames", morphs.weights.cols()},
+            {"rate_hz", morphs.rate_hz},
+            {"loop", morphs.loop}};
+  for (const retarget::MorphTarget& target : morphs.targets) {
+    json["targets"].push_back({{"name", target.name},
+                               {"vertices", packed_as<std::uint32_t>(target.vertices)},
+                               {"offsets", packed_as<float>(target.offsets)}});
+  }
+  return json;
+}
+
 Json motion_json(const PageMotion& shown) {
   const retarget::Motion& motion = shown.motion;
   const double most = shown.of_skin ? kSkinRate : kNodeRate;
@@ -103,19 +68,7 @@ Json motion_json(const PageMotion& shown) {
   json["duration_s"] = motion.duration_s();
   json["travel"] = {motion.travel.x(), motion.travel.y(), motion.travel.z()};
   json["yaw"] = motion.yaw;
-  return json;
-}
-
-Json chart_json(const PageChart& chart) {
-  Json json{{"title", chart.title}, {"x_label", chart.x_label}, {"y_label", chart.y_label}, {"over_time", chart.over_time}};
-  json["curves"] = Json::array();
-  for (const PageCurve& curve : chart.curves) {
-    assert(curve.x.size() == curve.y.size());
-    json["curves"].push_back({{"name", curve.name},
-                              {"role", role_name(curve.role)},
-                              {"x", packed_as<double>(curve.x)},
-                              {"y", packed_as<float>(curve.y)}});
-  }
+  if (!shown.morphs.targets.empty()) json["morphs"] = morphs_json(shown.morphs);
   return json;
 }
 
@@ -193,22 +146,9 @@ Json looks_json(const Appearance& appearance) {
   return json;
 }
 
-Json morphs_json(const retarget::MovingMorphs& morphs) {
-  Json json{{"targets", Json::array()},
-            {"weights", packed_as<float>(morphs.weights)},
-            {"frames", morphs.weights.cols()},
-            {"rate_hz", morphs.rate_hz},
-            {"loop", morphs.loop}};
-  for (const retarget::MorphTarget& target : morphs.targets) {
-    json["targets"].push_back({{"name", target.name},
-                               {"vertices", packed_as<std::uint32_t>(target.vertices)},
-                               {"offsets", packed_as<float>(target.offsets)}});
-  }
-  return json;
-}
-
 Json page_json(const PageInput& input) {
   Json json;
+  json["schema"] = "hydrostat.page/1";
   json["report"] = Json::parse(report_json(input.report));
   json["ground_height"] = input.ground_height;
   json["has_ground"] = input.has_ground;
@@ -235,34 +175,10 @@ Json page_json(const PageInput& input) {
   return json;
 }
 
-/// Text that may stand inside a script element: no '<', so that no name from a clip can end it.
-std::string without_tags(const std::string& json) {
-  std::string text;
-  text.reserve(json.size());
-  for (char c : json) {
-    if (c == '<') {
-      text += "\\u003c";
-    } else {
-      text += c;
-    }
-  }
-  return text;
-}
-
 }  // namespace
 
 void write_report_page(const std::filesystem::path& path, const PageInput& input) {
-  std::string page =
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<link rel=\"icon\" href=\"data:,\">\n<title>hydrostat</title>\n<style>";
-  page += viewer_style();
-  page += "</style>\n</head>\n<body>\n<script type=\"application/json\" id=\"data\">";
-  page += without_tags(page_json(input).dump(-1, ' ', false, Json::error_handler_t::replace));
-  page += "</script>\n<script>";
-  page += viewer_script();
-  page += "</script>\n</body>\n</html>\n";
-  write_file(path, page);
+  write_viewer_page(path, page_json(input));
 }
 
 }  // namespace hydrostat::io

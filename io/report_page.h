@@ -23,6 +23,7 @@ struct PageMotion {
   PageRole role = PageRole::kOther;
   bool of_skin = false;  // holds the skin's vertices (3V x F); otherwise the control nodes (3N x F)
   retarget::Motion motion;
+  retarget::MovingMorphs morphs = {};  // that the skin wears in this motion alone
 };
 
 struct PageCurve {

@@ -243,7 +243,7 @@ class SceneReader {
     } else if (shape == "ball") {
       obstacle.shape = physics::Ball{table.number("size_m", kLength) / 2};
     } else if (shape == mesh) {
-      obstacle.shape = surface_of<Dim>(table);
+      obstacle.shape = surface_of<Dim>(table, scene_.warnings);
     }
     obstacle.place = place_of(table);
     obstacle.turn = rotation_of<Dim>(table);

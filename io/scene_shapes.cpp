@@ -116,7 +116,7 @@ double enclosed_volume(const ClosedMeshOf<Dim>& surface) {
 /// The lattice body inside a surface, stretched a little so that it has the surface's volume.
 template <int Dim>
 SimplexMeshOf<Dim> inside(const TomlReader& body, std::vector<std::string>& warnings) {
-  const ClosedMeshOf<Dim> surface = surface_of<Dim>(body);
+  const ClosedMeshOf<Dim> surface = surface_of<Dim>(body, warnings);
   const Fineness fineness = fineness_of<Dim>(body);
   const double whole = enclosed_volume(surface);
   const double cell = fineness.cell > 0 ? fineness.cell : std::pow(whole / static_cast<double>(fineness.nodes), 1.0 / Dim);
@@ -203,12 +203,12 @@ BlockOf<Dim> rotation_of(const TomlReader& table) {
 }
 
 template <int Dim>
-ClosedMeshOf<Dim> surface_of(const TomlReader& table) {
+ClosedMeshOf<Dim> surface_of(const TomlReader& table, std::vector<std::string>& warnings) {
   if constexpr (Dim == 3) {
     const std::filesystem::path file = std::filesystem::absolute(table.file()).parent_path() / table.text("file");
     const double scale = table.number_or("scale", 1, kLength);
     try {
-      const ClosedMeshOf<3> surface = read_closed_mesh(file);
+      const ClosedMeshOf<3> surface = read_closed_mesh(file, warnings);
       return {scale * surface.vertices(), surface.faces()};
     } catch (const Error& error) {
       throw table.refusal("file", file.string() + ": " + error.what(), error.mend);
@@ -216,6 +216,10 @@ ClosedMeshOf<Dim> surface_of(const TomlReader& table) {
   } else {
     Eigen::Matrix2Xd corners = table.lists("outline_m", 2, kPlace);
     if (corners.cols() < 3) throw table.refusal("outline_m", "the outline has fewer than three corners", "Give three or more.");
+    for (int k = 0; k < corners.cols(); ++k) {
+      if (corners.col(k) != corners.col((k + 1) % corners.cols())) continue;
+      throw table.refusal("outline_m", "corner " + std::to_string(k + 1) + " of the outline stands twice", "Give each corner once.");
+    }
     if (cuts_itself(corners)) throw table.refusal("outline_m", "the outline cuts itself", "Give the corners in their order around.");
     Eigen::Matrix2Xi sides(2, corners.cols());
     double area = 0;
@@ -295,7 +299,7 @@ std::vector<char> points_within(const TomlReader& table, const PointsOf<Dim>& po
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                          \
   template BlockOf<Dim> rotation_of<Dim>(const TomlReader&);                                                \
-  template ClosedMeshOf<Dim> surface_of<Dim>(const TomlReader&);                                            \
+  template ClosedMeshOf<Dim> surface_of<Dim>(const TomlReader&, std::vector<std::string>&);                 \
   template physics::ElementMesh<Dim> body_mesh<Dim>(const TomlReader&, std::string&, std::string&,          \
                                                     Eigen::MatrixXi&, std::vector<std::string>&);           \
   template std::vector<char> points_within<Dim>(const TomlReader&, const PointsOf<Dim>&);

@@ -16,9 +16,10 @@ constexpr double radians(double degrees) { return degrees * 3.141592653589793238
 template <int Dim>
 physics::BlockOf<Dim> rotation_of(const TomlReader& table);
 
-/// A closed surface: `file` with `scale` in 3D, `outline_m` in 2D. Throws Error where it is not closed or cuts itself.
+/// A closed surface: `file` with `scale` in 3D, `outline_m` in 2D; `warnings` receives what of it was mended. Throws Error where it is
+/// not closed or cuts itself.
 template <int Dim>
-physics::ClosedMeshOf<Dim> surface_of(const TomlReader& table);
+physics::ClosedMeshOf<Dim> surface_of(const TomlReader& table, std::vector<std::string>& warnings);
 
 /// The rest shape of [body] in its own frame, without materials. `shape` and `element` become their names ("sphere", "tet"),
 /// `cells` the nodes of the boxes that its tets or triangles are cut from (2^Dim x C, as ElementMesh has them; empty where there are

@@ -42,7 +42,7 @@ double enclosed_volume(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix3Xi&
 
 }  // namespace
 
-physics::ClosedMeshOf<3> read_closed_mesh(const std::filesystem::path& file) {
+physics::ClosedMeshOf<3> read_closed_mesh(const std::filesystem::path& file, std::vector<std::string>& warnings) {
   const Eigen::Matrix3Xd corners = corners_of(read_in_worker(file.string()));
   if (corners.cols() == 0) throw Error(file.string(), "", "holds no triangle", "Give a file with a closed mesh.");
   const double extent = (corners.rowwise().maxCoeff() - corners.rowwise().minCoeff()).maxCoeff();
@@ -66,10 +66,18 @@ physics::ClosedMeshOf<3> read_closed_mesh(const std::filesystem::path& file) {
   }
   Eigen::Matrix3Xi triangles(3, static_cast<Eigen::Index>(faces.size()));
   for (std::size_t f = 0; f < faces.size(); ++f) triangles.col(static_cast<Eigen::Index>(f)) = faces[f];
-  if (enclosed_volume(vertices, triangles) < 0) triangles.row(1).swap(triangles.row(2));
+  const std::string name = file.filename().string();
+  if (const std::size_t needles = vertex_of.size() / 3 - faces.size(); needles > 0) {
+    warnings.push_back("'" + name + "': " + std::to_string(needles) + " of " + std::to_string(vertex_of.size() / 3) +
+                       " triangles are needles; they are left out.");
+  }
+  if (enclosed_volume(vertices, triangles) < 0) {
+    triangles.row(1).swap(triangles.row(2));
+    warnings.push_back("'" + name + "': its triangles look inward; they are turned.");
+  }
   const std::string broken = physics::broken_mesh_rule<3>(vertices, triangles);
   if (!broken.empty()) {
-    throw Error(file.string(), "mesh", broken, "Close its holes and make all faces look outward, in the program that made it.");
+    throw Error(file.string(), "mesh", broken, "Close its holes, take out faces without area and make all look outward, in the program that made it.");
   }
   return {vertices, triangles};
 }

@@ -52,6 +52,8 @@ StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body, const InternalForces
 /// Internal forces are pairwise and taken at the positions from which the step starts, so linear and angular momentum
 /// change by the booked impulses alone, to rounding. Contact is solved on the velocity that moves the body: a point at gap g
 /// may approach with g / h at most; projected Gauss-Seidel over the points inside Coulomb's cone (Moreau's time stepping).
+/// Source: Hairer, Lubich, Wanner, "Geometric numerical integration", 2006, eq. (I.1.9) and, with velocities at half steps,
+/// (I.1.17); Jean, "The non-smooth contact dynamics method", CMAME 177, 1999, for contact.
 template <int Dim>
 class ExplicitStepper final : public StepperOf<Dim> {
  public:

@@ -44,7 +44,7 @@ constexpr double kRounding = 1e-12;  // of the potential [-]: a smaller decrease
 /// are its weight.
 /// Source: Liu, Bouaziz, Kavan, "Quasi-Newton methods for real-time simulation of hyperelastic materials", TOG 36(3), 2017,
 /// section 4 (we take the projected Hessian of a past state for their Laplacian); Hairer, Lubich, Wanner, "Geometric numerical
-/// integration", 2006, section IV.2.1 for what the midpoint rule keeps.
+/// integration", 2006, eq. (I.1.7) for the midpoint rule and theorem IV.2.1 for what it keeps.
 template <int Dim>
 class ImplicitStepper final : public StepperOf<Dim> {
  public:

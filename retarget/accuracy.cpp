@@ -361,18 +361,18 @@ double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions&
   accuracy.windows = kEstimatedWindows;
   const StepSetting setting{options.method, options.dt_s};
   const std::vector<WindowOf<Dim>> windows = windows_along(scenario, accuracy, setting);
-  const bool is_accurate = options.method == physics::Method::kExplicit || options.method == physics::Method::kImplicit;
   const double substep = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
   StepSetting finer{options.method, options.dt_s / (2 * std::max(1.0, std::round(options.dt_s / substep)))};
-  if (!is_accurate) {
-    const double own = own_step(scenario.scene, options.dt_s);
-    finer = own < kShortestStep ? StepSetting{physics::Method::kImplicit, whole_part(options.dt_s, kImplicitStep)}
-                                : StepSetting{physics::Method::kExplicit, own};
+  const bool is_accurate = options.method == physics::Method::kExplicit || options.method == physics::Method::kImplicit;
+  const bool is_stiff = options.method == physics::Method::kExplicit && substep < options.dt_s && finer.dt_s < kShortestStep;
+  if (!is_accurate) finer = {physics::Method::kExplicit, own_step(scenario.scene, options.dt_s)};
+  if (is_stiff || (!is_accurate && finer.dt_s < kShortestStep)) {
+    finer = {physics::Method::kImplicit, whole_part(options.dt_s, kImplicitStep)};
   }
   const ContactPointsOf<Dim>& skin = scenario.scene.contact_points;
   const auto coarse = repeat(scenario, windows, setting, accuracy.frame_s, skin, false).places;
   const auto fine = repeat(scenario, windows, finer, accuracy.frame_s, skin, false).places;
-  return (is_accurate ? 2 : 1) * distance<Dim>(coarse, fine) / scenario.length;
+  return (finer.method == options.method ? 2 : 1) * distance<Dim>(coarse, fine) / scenario.length;
 }
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                                          \

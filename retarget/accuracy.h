@@ -111,8 +111,8 @@ template <int Dim>
 StepChoice choose_setting(const ReferenceOf<Dim>& reference, double most_m, std::optional<physics::Method> only);
 
 /// The error of a setting [per L, RMS over the skin] where no bound was asked for, from few runs: its distance to the same
-/// method in half steps, doubled, or to an accurate method where its own limit is another body (xpbd, spring) or far
-/// (euler).
+/// method in half steps, doubled, or to an accurate method where its own limit is another body (xpbd, spring), far (euler)
+/// or out of reach (explicit on a stiff body).
 template <int Dim>
 double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
 

@@ -6,6 +6,7 @@
 
 #include "physics/elastic_forces.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/wobble_plan.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -73,7 +74,8 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
   const double damping = seconds_of([&] { physics::add_damping_forces(body, state.x, state.v, force); });
   const double gravity = seconds_of([&] { force.colwise() += performer.scene.gravity; });
   const double embedding = seconds_of([&] { embedded_positions(performer.embedding, state.x); });
-  const bool pushed = !options.pushes.empty(), touches_itself = performer.scene.self_contact.is_on;
+  const bool pushed = !options.pushes.empty(), touches_itself = performer.scene.self_contact.is_on,
+             wobbles = performer.wobble.is_on();
   const double pushing = pushed ? seconds_of([&] { force += state.v; }) : 0;
 
   return {
@@ -96,7 +98,8 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
       {"pushes", pushed ? "on" : "off", pushed ? "asked for by --push" : "none was asked for", ms(pushing * passes)},
       {"embedding", "on", "the skin follows the nodes of its tets; counted at 60 frames a second, outside the solver",
        ms(embedding * kFramesPerSecond)},
-      {"wobble", "off", "not simulated in this version: the skin has no motion of its own", 0},
+      {"wobble", wobbles ? "on" : "off", performer.wobble.reason,
+       wobbles ? ms(wobble_seconds(performer) * performer.prepared.target.rate_hz) : 0},
       {"fracture", "off", "a creature has no seams; scenes have [[seam]]", 0},
   };
 }

@@ -140,7 +140,7 @@ Frame make_frame(const Dynamics& dynamics, Eigen::Index f, const InverseOptions&
   problem.lower.segment(3 * nodes, edges).setConstant(-options.limit);
   problem.upper.segment(3 * nodes, edges).setConstant(options.limit);
   problem.lower.tail(forces).setZero();
-  if (!body.elements.empty()) problem.coupled_rows = 3 * nodes;
+  problem.coupled_rows = 3 * nodes;
   const int rows = 6 * nodes + edges + forces;
   for (int i = 0; i <= nodes; ++i) problem.column_blocks.push_back(3 * i);
   for (int c = 3 * nodes + 1; c <= columns; ++c) problem.column_blocks.push_back(c);

@@ -2,13 +2,14 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
+
+#include "retarget/saddle_system.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -89,61 +90,6 @@ ceres::Solver::Options linear_solver_options() {
   return options;
 }
 
-/// The free entries of a problem with coupled_rows: C x - b of those rows, and one square d (x - w)^2 a column of all
-/// others. With the residuals t = C x - b, x = w - C^T t / d of the free columns, and t solves (I + C D^-1 C^T) t = C w - b.
-class DualSystem {
- public:
-  explicit DualSystem(const BoundedLeastSquares& problem)
-      : coupled_(problem.jacobian.topRows(problem.coupled_rows)),
-        target_(problem.target.head(problem.coupled_rows)),
-        weight_(Eigen::VectorXd::Zero(coupled_.cols())),
-        pull_(weight_) {
-    for (Eigen::Index r = problem.coupled_rows; r < problem.jacobian.rows(); ++r) {
-      for (decltype(problem.jacobian)::InnerIterator it(problem.jacobian, r); it; ++it) {
-        weight_[it.col()] += it.value() * it.value();
-        pull_[it.col()] += it.value() * problem.target[r];
-      }
-    }
-  }
-
-  /// Solves for the columns whose side is 0; a barrier adds weight (x - target)^2, or there is none.
-  void solve(const std::vector<int>& side, const Eigen::VectorXd* barrier_weight, const Eigen::VectorXd* barrier_target,
-             Eigen::VectorXd& x) {
-    constexpr int kRefinements = 2;
-    Eigen::VectorXd weight = weight_, pull = pull_;
-    if (barrier_weight != nullptr) {
-      weight += *barrier_weight;
-      pull += barrier_weight->cwiseProduct(*barrier_target);
-    }
-    const Eigen::VectorXd wish = pull.cwiseQuotient(weight);
-    system_.setIdentity(coupled_.rows(), coupled_.rows());
-    for (Eigen::Index c = 0; c < coupled_.cols(); ++c) {
-      if (side[static_cast<std::size_t>(c)] != 0) continue;
-      x[c] = wish[c];
-      for (Eigen::SparseMatrix<double>::InnerIterator a(coupled_, c); a; ++a) {
-        const double share = a.value() / weight[c];
-        for (Eigen::SparseMatrix<double>::InnerIterator b(coupled_, c); b && b.row() <= a.row(); ++b) {
-          system_(a.row(), b.row()) += share * b.value();
-        }
-      }
-    }
-    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(system_);
-    Eigen::VectorXd residual = Eigen::VectorXd::Zero(coupled_.rows());
-    for (int k = 0; k <= kRefinements; ++k) {
-      residual += factor.solve(coupled_ * x - target_ - residual);
-      const Eigen::VectorXd slope = coupled_.transpose() * residual;
-      for (Eigen::Index c = 0; c < x.size(); ++c) {
-        if (side[static_cast<std::size_t>(c)] == 0) x[c] = wish[c] - slope[c] / weight[c];
-      }
-    }
-  }
-
- private:
-  Eigen::SparseMatrix<double> coupled_;
-  Eigen::VectorXd target_, weight_, pull_;
-  Eigen::MatrixXd system_;
-};
-
 constexpr int kPatience = 3;       // pivots that may pass without fewer wrong entries
 constexpr double kSlack = 1e-11;   // cosine between a column and the residuals that counts as none
 
@@ -159,8 +105,8 @@ class BoundedSolver {
       for (int c = first; c < end; ++c) block_of_column[static_cast<std::size_t>(c)] = b;
       if (problem.coupled_rows == 0) ceres_.AddParameterBlock(solution_.x.data() + first, end - first);
     }
-    if (problem.coupled_rows > 0) dual_.emplace(problem);
-    for (std::size_t k = 0; !dual_ && k + 1 < problem.row_blocks.size(); ++k) {
+    if (problem.coupled_rows > 0) saddle_.emplace(problem);
+    for (std::size_t k = 0; !saddle_ && k + 1 < problem.row_blocks.size(); ++k) {
       std::vector<int> blocks;
       auto* rows = new LinearRows(problem, problem.row_blocks[k], problem.row_blocks[k + 1], block_of_column, blocks);
       std::vector<double*> parameters;
@@ -199,7 +145,7 @@ class BoundedSolver {
     for (std::size_t b = 0; b + 1 < problem_.column_blocks.size(); ++b) {
       const int first = problem_.column_blocks[b], at = side_[static_cast<std::size_t>(first)];
       double* block = solution_.x.data() + first;
-      if (dual_) {
+      if (saddle_) {
         if (at != 0) *block = at < 0 ? problem_.lower[first] : problem_.upper[first];
         continue;
       }
@@ -211,7 +157,7 @@ class BoundedSolver {
       *block = at < 0 ? problem_.lower[first] : problem_.upper[first];
       ceres_.SetParameterBlockConstant(block);
     }
-    if (dual_) return dual_->solve(side_, nullptr, nullptr, solution_.x);
+    if (saddle_) return saddle_->solve(side_, nullptr, nullptr, solution_.x);
     ceres::Solver::Summary summary;
     ceres::Solve(options_, &ceres_, &summary);
   }
@@ -260,7 +206,7 @@ class BoundedSolver {
   const ceres::Solver::Options options_;
   const int columns_;
   ceres::Problem ceres_;
-  std::optional<DualSystem> dual_;  // in the place of ceres_
+  std::optional<SaddleSystem> saddle_;  // in the place of ceres_
   BoundedSolution solution_;
   std::vector<int> side_;  // -1: clamped at the lower bound, +1: at the upper one, 0: free
   Eigen::VectorXd curvature_, gradient_scale_;  // per column: its square, and its length times the target's
@@ -277,12 +223,12 @@ void BoundedSolver::approach_from_inside() {
   std::vector<ceres::ResidualBlockId> blocks;
   for (std::size_t b = 0; b + 1 < problem_.column_blocks.size(); ++b) {
     const int c = problem_.column_blocks[b];
-    if (!dual_) ceres_.SetParameterBlockVariable(x.data() + c);
+    if (!saddle_) ceres_.SetParameterBlockVariable(x.data() + c);
     if (lower[c] == -kInfinity && upper[c] == kInfinity) continue;
     const double width = std::min(upper[c] - lower[c], 1.0);
     x[c] = std::clamp(x[c], lower[c] + 0.1 * width, upper[c] - 0.1 * width);
     bounded.push_back(c);
-    if (dual_) continue;
+    if (saddle_) continue;
     barriers.push_back(new Barrier);
     blocks.push_back(ceres_.AddResidualBlock(barriers.back(), nullptr, x.data() + c));
   }
@@ -305,13 +251,13 @@ void BoundedSolver::approach_from_inside() {
       const double to_lower = x[c] - lower[c], to_upper = upper[c] - x[c];
       barrier_weight[c] = below[c] / to_lower + above[c] / to_upper;
       barrier_target[c] = x[c] + (mu / to_lower - mu / to_upper) / barrier_weight[c];
-      if (dual_) continue;
+      if (saddle_) continue;
       barriers[k]->weight = barrier_weight[c];
       barriers[k]->target = barrier_target[c];
     }
     const Eigen::VectorXd before = x;
-    if (dual_) {
-      dual_->solve(all_free, &barrier_weight, &barrier_target, x);
+    if (saddle_) {
+      saddle_->solve(all_free, &barrier_weight, &barrier_target, x);
     } else {
       ceres::Solver::Summary summary;
       ceres::Solve(options_, &ceres_, &summary);

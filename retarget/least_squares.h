@@ -27,9 +27,9 @@ struct BoundedSolution {
 /// Ceres solves for the free entries while the clamped ones are held; block principal pivoting over them (Portugal,
 /// Judice, Vicente 1994) releases and clamps until the conditions of Karush, Kuhn and Tucker hold. Where that does not
 /// settle, a primal-dual interior-point method (Wright, "Primal-Dual Interior-Point Methods", 1997), its steps solved by
-/// Ceres too, comes near, and pivoting ends from there. With coupled_rows, a dense factorisation of the dual system takes
-/// Ceres' place: where many columns meet in a row, their normal equations are nearly full. A column block of more than one
-/// entry must be unbounded. `start` says which entries begin clamped: those that lie on a bound.
+/// Ceres too, comes near, and pivoting ends from there. With coupled_rows, a sparse factorisation of the saddle-point
+/// system (saddle_system.h) takes Ceres' place: where many columns meet in a row, their normal equations are nearly full. A
+/// column block of more than one entry must be unbounded. `start` says which entries begin clamped: those that lie on a bound.
 BoundedSolution solve(const BoundedLeastSquares& problem, const Eigen::VectorXd& start, int max_pivots = 40);
 
 }  // namespace hydrostat::retarget

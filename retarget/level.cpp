@@ -124,6 +124,9 @@ Level at_level(const Performer& solved, const SignalSet& signals, const Rig& rig
   SelfContactPlan plan = plan_self_contact(performer);
   performer.scene.self_contact = std::move(plan.settings);
   performer.self_contact_reason = std::move(plan.reason);
+  const std::string wobble = solved.wobble.is_on() ? "not planned on this level" : solved.wobble.reason;
+  performer.wobble = {};  // its modes are of the solved mesh
+  performer.wobble.reason = wobble;
   level.signals = carried_signals(solved, signals, rig, performer);
   return level;
 }

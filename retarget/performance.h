@@ -6,6 +6,7 @@
 #include "retarget/morphs.h"
 #include "retarget/replay.h"
 #include "retarget/signal_set.h"
+#include "retarget/wobble.h"
 
 namespace hydrostat::retarget {
 
@@ -21,6 +22,7 @@ struct Performer {
   Motion clip_points;      // the contact points as the clip has them, 3P x F
   Motion clip_skin;        // all of the skin likewise, thinned for the eye, 3V x F
   MovingMorphs morphs;     // that the skin wears over what the body carries
+  Wobble wobble;           // and how its flesh swings there
   double clip_rise = 0;    // [m] of the centre of mass of the clip's nodes, over its height at the start
   double length = 1, size = 1;  // L and D [m]
   std::string self_contact_reason = "nobody asked for it";  // why the scene has it or not

@@ -128,7 +128,7 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
        cost_of_fluid(scene.water));
   tell("pushes", pushed, "the scene has none", "", pushed ? ms_of([&] { force += state.v; }) : 0);
   tell("embedding", false, "the skin is the mesh's own surface", "", 0);
-  tell("wobble", false, "not simulated in this version: the skin has no motion of its own", "", 0);
+  tell("wobble", false, "of creatures alone: what is seen of a scene are its nodes", "", 0);
   tell("fracture", scenario.fracture.has_value(), "no seam is marked", "one pass over what touches the seams a step",
        ms_of_fracture(scenario, options));
   return effects;

@@ -1,25 +1,109 @@
 #!/usr/bin/env bash
-# Makes the pictures of README anew, in samples/figures/:  samples/figures.sh [HYDROSTAT]
-# Without HYDROSTAT: build/release/hydrostat, which is built where it is not there. Times are this machine's.
+# Makes the pictures and the measured tables of README anew:  samples/figures.sh [WHAT...]
+#   scenes    pictures of the scenes' accuracy and effects                          minutes
+#   creature  the trot's own curve of accuracy                                      a quarter of an hour
+#   levels    levels of detail, table and picture (clips that are not ours from HYDROSTAT_ASSETS, where they are there)  an hour
+#   speed     what the stages of a conversion cost                                  minutes
+#   import    what reading the samples costs                                        seconds
+#   damping   explicit against implicit over damping and stiffness (installs what tests/bench/run.sh wants)   a quarter of an hour
+#   peers     our methods against Bullet's (the same)                               a quarter of an hour
+#   stability the suite of hard scenes: hours, and therefore only where it is named
+#   draw      tables and pictures from what was measured before (samples/figures/*.csv): seconds, also only where named
+# Without WHAT all but the last two. HYDROSTAT names another program than build/release/hydrostat, which is built where it is not
+# there. Times are this machine's. What is measured goes to out/figures/; a creature that is there is not converted again.
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")
-hydrostat=${1:-$project/build/release/hydrostat}
-figures=$project/samples/figures
-scratch=$(mktemp -d)
-trap 'rm -rf -- "$scratch"' EXIT
+hydrostat=${HYDROSTAT:-$project/build/release/hydrostat}
+assets=${HYDROSTAT_ASSETS:-$project/../shared/assets}
+figures=$project/samples/figures readme=${HYDROSTAT_README:-$project/README.md}
+out=$project/out/figures
 
 if [ ! -x "$hydrostat" ]; then
   cd -- "$project"
   cmake --preset release
   cmake --build --preset release --target hydrostat -j "${HYDROSTAT_BUILD_JOBS:-$(nproc)}"
 fi
-mkdir -p -- "$figures"
-curve() {  # SCENE OPTION...
-  "$hydrostat" bench accuracy "$project/samples/scenes/$1.toml" -o "$scratch/$1" --quiet "${@:2}"
-  cp -- "$scratch/$1/accuracy.svg" "$figures/accuracy_$1.svg"
+mkdir -p -- "$figures" "$out"
+
+table() {  # KIND ENDING MEASURED...
+  node "$project/samples/figures.mjs" "$1" "$figures/$1.$2" "$readme" "${@:3}"
 }
-curve clamped_bar --duration 0.2 --max-error 0.05%
-curve bouncing_circle
-"$hydrostat" bench effects "$project/samples/scenes/swimming_eel.toml" -o "$scratch/eel"
-cp -- "$scratch/eel/effects.svg" "$figures/effects_swimming_eel.svg"
-echo "Pictures in $figures"
+curve() {  # SCENE OPTION...
+  "$hydrostat" bench accuracy "$project/samples/scenes/$1.toml" -o "$out/$1" --quiet "${@:2}"
+  cp -- "$out/$1/accuracy.svg" "$figures/accuracy_$1.svg"
+}
+make_creature() {  # NAME CLIP OPTION...
+  [ -f "$out/$1/creature.toml" ] || "$hydrostat" convert "$2" -o "$out/$1" --quiet "${@:3}" || [ $? = 3 ]
+}
+make_levels() {  # NAME CLIP OPTION...: a report a level, of a quarter to four times the nodes
+  if [ ! -f "$2" ]; then
+    echo "figures.sh: $2: is not there. The rows of '$1' stay as they are."
+    return
+  fi
+  make_creature "$@"
+  local solved
+  solved=$(node -p 'JSON.parse(fs.readFileSync(process.argv[1])).nodes.length' "$out/$1/body.json")
+  local part
+  for part in 25 50 100 200 400; do
+    local nodes=$((solved * part / 100))
+    [ "$nodes" -ge 20 ] || continue
+    "$hydrostat" replay "$out/$1" --lod "$nodes" --duration 4 --json --quiet > "$out/reports/$1.$part.json" || [ $? = 3 ]
+    reports+=("$out/reports/$1.$part.json")
+  done
+}
+
+run_scenes() {
+  curve clamped_bar --duration 0.2 --max-error 0.05%
+  curve bouncing_circle
+  "$hydrostat" bench effects "$project/samples/scenes/swimming_eel.toml" -o "$out/eel"
+  cp -- "$out/eel/effects.svg" "$figures/effects_swimming_eel.svg"
+}
+run_creature() {
+  make_creature boxdog_trot "$project/samples/boxdog_trot.fbx"
+  "$hydrostat" bench accuracy "$out/boxdog_trot" -o "$out/trot" --max-error 2% --own-mesh --duration 0.2 --quiet
+  cp -- "$out/trot/accuracy.svg" "$figures/accuracy_boxdog_trot.svg"
+}
+run_levels() {
+  mkdir -p -- "$out/reports"
+  reports=()
+  make_levels boxdog_trot "$project/samples/boxdog_trot.fbx"
+  make_levels worm_crawl "$project/samples/worm_crawl.glb"
+  make_levels snake "$assets/gltf/snake.glb" --clip 'Side winding'
+  make_levels fox "$assets/gltf/fox.glb" --clip Walk --height 0.6
+  table levels csv "${reports[@]}"
+}
+run_speed() {
+  "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --nodes 150 --duration 1 --quiet > "$out/speed.txt"
+  table speed txt "$out/speed.txt"
+}
+run_import() {
+  "$hydrostat" bench import "$project/samples" -o "$out/import" > /dev/null
+  table import csv "$out/import/import.csv"
+}
+run_damping() {
+  "$project/tests/bench/run.sh" damping -o "$out/damping"
+  table damping csv "$out/damping/damping.csv"
+}
+run_peers() {
+  "$project/tests/bench/run.sh" peers -o "$out/peers" || [ $? = 1 ]  # which tells that a goal was missed
+  table peers csv "$out/peers/peers.csv"
+}
+run_stability() { "$project/tests/stability/run.sh" && "$project/tests/stability/run.sh" -r; }
+run_draw() {
+  local kept
+  for kept in levels.csv peers.csv damping.csv import.csv speed.txt; do
+    [ ! -f "$figures/$kept" ] || table "${kept%.*}" "${kept##*.}"
+  done
+}
+
+[ $# -gt 0 ] || set -- scenes creature levels speed import damping peers
+for what; do
+  [ "$(type -t "run_$what")" = function ] || {
+    echo "figures.sh: '$what' is nothing that it makes. Name scenes, creature, levels, speed, import, damping, peers, stability or draw." >&2
+    exit 2
+  }
+done
+for what; do
+  "run_$what"
+  echo "$what: done"
+done

@@ -23,7 +23,7 @@ function add_legend(parent, curves, toggle) {
   const legend = element(parent, 'div', 'legend');
   curves.slice(0, kMostLegends).forEach((curve, index) => {
     const entry = element(legend, 'button', 'legend_entry', curve.name);
-    entry.style.setProperty('--mark', colour_of(curve.role, index));
+    entry.style.setProperty('--mark', colour_of(curve.role, curve.rank ?? index));
     entry.onclick = () => toggle(index, !entry.classList.toggle('is_off'));
   });
   if (curves.length > kMostLegends) element(legend, 'span', 'faint', `and ${curves.length - kMostLegends} more`);
@@ -47,7 +47,7 @@ class TimeChart {
       axes: [{ ...axis, size: 26, values: (u, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: kAxisWidth }],
       series: [{}, ...chart.curves.map((curve, index) => ({
         label: curve.name,
-        stroke: colour_of(curve.role, index),
+        stroke: colour_of(curve.role, curve.rank ?? index),
         width: curve.role === 'replay' ? 1.8 : 1.3,
         points: { show: false },
       }))],
@@ -96,7 +96,7 @@ class MapChart {
     });
     this.canvas = element(this.parent, 'canvas');
     this.curves = chart.curves.map((curve, index) => ({
-      x: doubles(curve.x), y: floats(curve.y), colour: colour_of(curve.role, index), shown: true,
+      x: doubles(curve.x), y: floats(curve.y), colour: colour_of(curve.role, curve.rank ?? index), shown: true,
     }));
     this.redraw();
   }

@@ -76,3 +76,7 @@ export const kRoles = {
 const kPalette = ['#f2803a', '#4f8ef7', '#20a884', '#a875f0', '#e0527a', '#c9a227', '#3bb3c9', '#8d9a3a', '#b5714a', '#7784a8'];
 
 export const colour_of = (role, index) => kRoles[role]?.colour ?? kPalette[index % kPalette.length];
+
+/** What the page calls a motion, and its colour: of a comparison's runs their names, otherwise its role's. */
+export const mark_of = (motion) =>
+  motion.name === undefined ? kRoles[motion.role] : { label: motion.name, colour: colour_of('other', motion.performer) };

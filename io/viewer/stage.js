@@ -6,7 +6,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
-import { centre, floats, indices, kRoles } from './data.js';
+import { centre, floats, indices, kRoles, mark_of } from './data.js';
 import { Looks } from './looks.js';
 import { Morphs } from './morphs.js';
 
@@ -90,15 +90,20 @@ function grid_material(step, lines) {
   return material;
 }
 
+/** The body that a motion moves, and what it wears. */
+function performer_of(told) {
+  const skin = { nodes: indices(told.skin.nodes), weights: floats(told.skin.weights) };
+  const rest = floats(told.body.nodes);
+  return {
+    skin, rest, triangles: indices(told.skin.triangles), edges: indices(told.body.edges), looks: told.looks,
+    morphs: told.morphs && new Morphs(told.morphs, skin, rest),
+  };
+}
+
 export class Stage {
   constructor(canvas, page) {
     this.canvas = canvas;
-    this.skin = { nodes: indices(page.skin.nodes), weights: floats(page.skin.weights) };
-    this.triangles = indices(page.skin.triangles);
-    this.told_looks = page.looks;
-    this.edges = indices(page.body.edges);
-    this.rest = floats(page.body.nodes);
-    if (page.morphs) this.morphs = new Morphs(page.morphs, this.skin, this.rest);
+    this.performers = [page, ...(page.others ?? [])].map(performer_of);
     this.length = page.report.body.length_m || 1;
     this.ground_normal = new Vector3(...page.ground_normal);
     this.ground_height = page.ground_height;
@@ -126,7 +131,7 @@ export class Stage {
     this.obstacles = page.obstacles.map((obstacle) => this.add_obstacle(obstacle));
     this.bodies = page.motions.filter((motion) => kRoles[motion.role]).map((motion) => this.add_body(motion));
     this.leader = (this.bodies.find((body) => body.motion.role === 'replay') ?? this.bodies[0])?.motion;
-    this.add_control_mesh();
+    for (const body of this.bodies) if (body.motion.role === 'replay') this.add_control_mesh(body);
     if (this.leader) this.place_camera();
   }
 
@@ -154,20 +159,27 @@ export class Stage {
   }
 
   add_body(motion) {
+    const performer = this.performers[motion.performer ?? 0];
     const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new BufferAttribute(new Float32Array((this.skin.nodes.length / 4) * 3), 3));
-    geometry.setIndex(new BufferAttribute(this.triangles, 1));
-    const material = new MeshStandardMaterial({
-      color: kRoles[motion.role].colour, roughness: 0.75, side: DoubleSide, flatShading: this.is_scene,
-    });
+    geometry.setAttribute('position', new BufferAttribute(new Float32Array((performer.skin.nodes.length / 4) * 3), 3));
+    geometry.setIndex(new BufferAttribute(performer.triangles, 1));
+    const { colour, label } = mark_of(motion);
+    const material = new MeshStandardMaterial({ color: colour, roughness: 0.75, side: DoubleSide, flatShading: this.is_scene });
     const mesh = new Mesh(geometry, material);
     mesh.frustumCulled = false;
     this.scene.add(mesh);
-    const body = { motion, mesh, visible: ['clip', 'target', 'replay'].includes(motion.role) };
-    if (motion.role === 'replay' && this.told_looks) {
-      body.looks = new Looks(this.told_looks, kRoles.replay.colour, () => this.draw());
-      material.visible = false;
+    const is_replay = motion.role === 'replay';
+    const body = { motion, performer, mesh, is_main: is_replay && !motion.performer, visible: is_replay || ['clip', 'target'].includes(motion.role) };
+    if (motion.morphs) body.morphs = new Morphs(motion.morphs, performer.skin, performer.rest);
+    if (is_replay && performer.looks) {
+      body.looks = new Looks(performer.looks, colour, () => this.draw());
       mesh.add(...body.looks.meshes);
+    }
+    if (motion.name !== undefined) {
+      body.label = this.canvas.parentElement.appendChild(document.createElement('div'));
+      body.label.className = 'body_name legend_entry';
+      body.label.style.setProperty('--mark', colour);
+      body.label.textContent = label;
     }
     return body;
   }
@@ -195,27 +207,29 @@ export class Stage {
     }
   }
 
-  /** The replay's springs, coloured by their stretch. */
-  add_control_mesh() {
+  /** A replay's springs, coloured by their stretch. */
+  add_control_mesh(body) {
+    const count = body.performer.edges.length;
     const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new BufferAttribute(new Float32Array(this.edges.length * 3), 3));
-    geometry.setAttribute('color', new BufferAttribute(new Float32Array(this.edges.length * 3), 3));
-    this.springs = new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true }));
-    this.springs.frustumCulled = false;
-    this.scene.add(this.springs);
+    geometry.setAttribute('position', new BufferAttribute(new Float32Array(count * 3), 3));
+    geometry.setAttribute('color', new BufferAttribute(new Float32Array(count * 3), 3));
+    body.springs = new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true }));
+    body.springs.frustumCulled = false;
+    this.scene.add(body.springs);
   }
 
   place_camera() {
     const [hx, hz] = this.is_flat ? [1, 0] : heading_of(this.leader, this.length);
     this.aside = [-hz, hx];
     const positions = this.bodies.map((body) => body.motion).find((motion) => motion.of_skin)?.at(0) ?? this.leader.at(0);
-    this.spacing = width_along(positions, this.aside) + 0.35 * this.length;
+    const widths = this.bodies.filter((body) => body.motion.performer).map((body) => width_along(body.motion.at(0), this.aside));
+    this.spacing = Math.max(width_along(positions, this.aside), ...widths) + 0.35 * this.length;
     const start = centre(this.leader.at(0));
     this.focus = new Vector3(start[0], 0.5 * (start[1] + this.ground_height), start[2]);
     if (this.is_scene) this.focus.set(...(this.whole?.centre ?? start));
     this.controls.target.copy(this.focus);
     this.camera_way = new Vector3(0.45 * hx - hz, 0.42, 0.45 * hz + hx).normalize();
-    if (this.is_flat) this.camera_way.set(0.12, 0.16, 1).normalize();
+    if (this.is_flat) this.camera_way.set(...(this.performers.length > 1 ? [0.8, 0.7, 1] : [0.12, 0.16, 1])).normalize(); // side by side is one behind the other
     this.set_distance();
   }
 
@@ -254,59 +268,62 @@ export class Stage {
     const side = this.view === 'side';
     for (const body of this.bodies) {
       body.mesh.visible = body.visible;
+      if (body.springs) body.springs.visible = this.shows_mesh && body.visible;
       if (!body.visible) continue;
       const rank = side ? shown.indexOf(body) - (shown.length - 1) / 2 : 0;
       body.mesh.position.set(rank * this.spacing * this.aside[0], 0, rank * this.spacing * this.aside[1]);
       this.dress(body, side);
       this.move_skin(body, t);
+      if (body.springs?.visible) this.move_springs(body, t);
     }
-    this.move_springs(t);
     this.move_obstacles(t);
     this.follow(t);
     this.draw();
   }
 
   /** The replay is solid; in the overlay what it is compared with is glass, and is seen where it stands out by some 0.5 % of L:
-      surfaces nearer than that would blotch each other. */
+      surfaces nearer than that would blotch each other. Other replays wear their own look beside it, and their colour over it. */
   dress(body, side) {
-    const is_replay = body.motion.role === 'replay';
-    const opacity = is_replay ? (this.shows_mesh ? 0.3 : 1) : side ? 1 : 0.3;
-    body.mesh.material.transparent = opacity < 1;
-    body.mesh.material.opacity = opacity;
-    body.mesh.material.depthWrite = opacity === 1;
-    Object.assign(body.mesh.material, { polygonOffset: !is_replay && !side, polygonOffsetFactor: 1, polygonOffsetUnits: 500 });
-    body.mesh.castShadow = (side || is_replay) && !body.looks;
+    const is_solid = body.is_main || side;
+    const opacity = body.springs?.visible ? 0.3 : is_solid ? 1 : 0.3;
+    body.wears_looks = !!body.looks && is_solid;
+    for (const part of body.looks?.meshes ?? []) part.visible = body.wears_looks;
+    const material = body.mesh.material;
+    material.visible = !body.wears_looks;
+    material.transparent = opacity < 1;
+    material.opacity = opacity;
+    material.depthWrite = opacity === 1;
+    Object.assign(material, { polygonOffset: !is_solid, polygonOffsetFactor: 1, polygonOffsetUnits: 500 });
+    body.mesh.castShadow = is_solid && !body.wears_looks;
     body.mesh.renderOrder = opacity < 1 ? 1 : 0;
     body.looks?.dress(opacity);
   }
 
   move_skin(body, t) {
+    const { skin, morphs } = body.performer;
     const attribute = body.mesh.geometry.getAttribute('position');
     const positions = body.motion.at(t);
     if (body.motion.of_skin) {
       attribute.array.set(positions);
     } else {
-      embed(positions, this.skin, attribute.array);
-      this.morphs?.put_on(t, positions, (body.turns ??= new Map()), attribute.array);
+      embed(positions, skin, attribute.array);
+      for (const worn of [morphs, body.morphs]) worn?.put_on(t, positions, (body.turns ??= new Map()), attribute.array);
     }
-    if (body.looks) return body.looks.move(attribute.array);
+    if (body.wears_looks) return body.looks.move(attribute.array);
     attribute.needsUpdate = true;
     body.mesh.geometry.computeVertexNormals();
   }
 
-  move_springs(t) {
-    const body = this.bodies.find((other) => other.motion === this.leader);
-    this.springs.visible = this.shows_mesh && !!body && body.visible && !this.leader.of_skin;
-    if (!this.springs.visible) return;
-    const nodes = this.leader.at(t);
-    const place = this.springs.geometry.getAttribute('position');
-    const colour = this.springs.geometry.getAttribute('color');
+  move_springs({ motion, performer: { edges, rest }, springs, mesh }, t) {
+    const nodes = motion.at(t);
+    const place = springs.geometry.getAttribute('position');
+    const colour = springs.geometry.getAttribute('color');
     const distance = (positions, a, b) =>
       Math.hypot(positions[3 * a] - positions[3 * b], positions[3 * a + 1] - positions[3 * b + 1], positions[3 * a + 2] - positions[3 * b + 2]);
     const tint = new Color();
-    for (let e = 0; e < this.edges.length; e += 2) {
-      const [a, b] = [this.edges[e], this.edges[e + 1]];
-      const strain = distance(nodes, a, b) / distance(this.rest, a, b) - 1;
+    for (let e = 0; e < edges.length; e += 2) {
+      const [a, b] = [edges[e], edges[e + 1]];
+      const strain = distance(nodes, a, b) / distance(rest, a, b) - 1;
       const strength = Math.min(1, Math.abs(strain) / 0.15);
       tint.setHSL(strain < 0 ? 0.6 : 0.02, strength, 0.5);
       [a, b].forEach((n, end) => {
@@ -314,7 +331,7 @@ export class Stage {
         colour.setXYZ(e + end, tint.r, tint.g, tint.b);
       });
     }
-    this.springs.position.copy(body.mesh.position);
+    springs.position.copy(mesh.position);
     place.needsUpdate = true;
     colour.needsUpdate = true;
   }
@@ -343,5 +360,18 @@ export class Stage {
 
   draw() {
     this.renderer.render(this.scene, this.camera);
+    for (const body of this.bodies) if (body.label) this.place_label(body);
+  }
+
+  /** The name of a compared body, over it; in the overlay the switches below tell them apart. */
+  place_label({ label, visible, motion, mesh }) {
+    label.hidden = !visible || this.view !== 'side';
+    if (label.hidden) return;
+    const [x, , z] = centre(motion.positions);
+    let top = -Infinity;
+    for (let i = 1; i < motion.positions.length; i += 3) top = Math.max(top, motion.positions[i]);
+    const place = new Vector3(x, top, z).add(mesh.position).project(this.camera);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    label.style.transform = `translate(-50%, -130%) translate(${(0.5 + 0.5 * place.x) * width}px, ${(0.5 - 0.5 * place.y) * height}px)`;
   }
 }

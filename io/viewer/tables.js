@@ -3,7 +3,7 @@
 const kUnits = [
   ['_rms_length', 100, '% L'], ['_per_cycle_length', 100, '% L'], ['_length', 100, '% L'], ['_max_size', 100, '% D'], ['_size', 100, '% D'],
   ['_l0', 100, '% l0'], ['_mgl', 1, 'mgL'], ['_mg', 1, 'mg'], ['_deg_per_cycle', 1, 'deg'], ['_m_s', 1, 'm/s'], ['_kg', 1, 'kg'], ['_pa', 1, 'Pa'],
-  ['_hz', 1, 'Hz'], ['_ms_per_sim_s', 1, 'ms/s'], ['_time_factor', 1, '×'], ['_m', 1, 'm'], ['_s', 1, 's'],
+  ['_hz', 1, 'Hz'], ['_ms_per_sim_s', 1, 'ms/s'], ['_ms', 1, 'ms'], ['_time_factor', 1, '×'], ['_m', 1, 'm'], ['_s', 1, 's'],
 ];
 const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_end', 'volume_error_rms', 'correction_rms', 'correction_buzz_rms', 'style_range', 'style_range_least', 'work_saved']);
 const kNames = {
@@ -22,7 +22,7 @@ const kNames = {
   inverted_elements: 'inverted elements, most', inverted_elements_end: 'inverted elements at the end', guard_steps: 'steps by the guard',
 };
 
-function element(parent, tag, name, text) {
+export function element(parent, tag, name, text) {
   const made = parent.appendChild(document.createElement(tag));
   if (name) made.className = name;
   if (text !== undefined) made.textContent = text;
@@ -42,12 +42,12 @@ function unit_of(key) {
   return kUnits.find(([ending]) => `_${key}`.endsWith(ending)) ?? ['', 1, ''];
 }
 
-function name_of(key) {
+export function name_of(key) {
   const ending = unit_of(key)[0];
   return kNames[key] ?? (ending ? `_${key}`.slice(1, 1 + key.length + 1 - ending.length) || key : key).replaceAll('_', ' ');
 }
 
-function text_of(key, value) {
+export function text_of(key, value) {
   if (value === null || value === undefined) return '–';
   if (typeof value === 'boolean') return value ? 'yes' : 'no';
   if (typeof value === 'string') return value || '–';
@@ -55,7 +55,7 @@ function text_of(key, value) {
   return `${number(value * factor)}${unit ? ` ${unit}` : ''}`;
 }
 
-function section(parent, title) {
+export function section(parent, title) {
   const made = element(parent, 'section', 'card');
   element(made, 'h2', '', title);
   return made;

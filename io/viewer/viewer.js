@@ -3,7 +3,8 @@ import 'uplot/dist/uPlot.min.css';
 import './viewer.css';
 
 import { add_charts } from './charts.js';
-import { kRoles, read_page } from './data.js';
+import { add_cards, add_differences, subtitle_of_comparison, title_of_comparison, verdict_of_comparison } from './comparison.js';
+import { mark_of, read_page } from './data.js';
 import { Stage } from './stage.js';
 import { add_tables, verdict } from './tables.js';
 
@@ -50,14 +51,21 @@ const longest = (motions) => Math.max(0, ...motions.map((motion) => motion.durat
 const end = longest(page.motions.filter((motion) => motion.role === 'replay')) || longest(page.motions) || 1;
 const state = { t: 0, playing: false, speed: 1 };
 
-function say_what_this_is() {
+function title_of_report() {
   const file = report.source.file.split('/').pop();
-  const name = report.source.clip || (report.simulation && file.replace(/\.toml$/, '').replaceAll('_', ' ')) || 'motion';
+  return report.source.clip || (report.simulation && file.replace(/\.toml$/, '').replaceAll('_', ' ')) || 'motion';
+}
+
+const subtitle_of_report = () =>
+  [report.source.file, `${report.body.nodes} nodes`, report.signals?.kind.replaceAll('_', ' '), report.accuracy.method].filter(Boolean).join(' · ');
+
+function say_what_this_is() {
+  const { comparison } = page;
+  const name = comparison ? title_of_comparison(comparison) : title_of_report();
   document.title = `${name} – hydrostat`;
   document.querySelector('h1').textContent = name;
-  find('subtitle').textContent =
-    [report.source.file, `${report.body.nodes} nodes`, report.signals?.kind.replaceAll('_', ' '), report.accuracy.method].filter(Boolean).join(' · ');
-  const trouble = verdict(report);
+  find('subtitle').textContent = comparison ? subtitle_of_comparison(comparison) : subtitle_of_report();
+  const trouble = comparison ? verdict_of_comparison(comparison) : verdict(report);
   find('banner').hidden = trouble === null;
   find('banner').textContent = trouble ?? '';
 }
@@ -76,7 +84,12 @@ function make_stage() {
 say_what_this_is();
 const stage = make_stage();
 const charts = add_charts({ charts: find('charts'), contacts: find('contacts') }, page, end, set_time);
-add_tables(find('tables'), report, page.accuracy_svg);
+if (page.comparison) {
+  add_cards(find('contacts'), page.comparison);
+  add_differences(find('tables'), page.comparison);
+} else {
+  add_tables(find('tables'), report, page.accuracy_svg);
+}
 
 function set_time(t) {
   state.t = Math.min(Math.max(0, t), end);
@@ -115,7 +128,7 @@ function set_theme(theme) {
 
 function add_body_switches() {
   for (const body of stage?.bodies ?? []) {
-    const { label, colour } = kRoles[body.motion.role];
+    const { label, colour } = mark_of(body.motion);
     const entry = document.createElement('label');
     const box = Object.assign(document.createElement('input'), { type: 'checkbox', checked: body.visible });
     entry.className = 'legend_entry';
@@ -193,7 +206,7 @@ add_body_switches();
 hide_what_has_no_use();
 set_theme(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 resize();
-if (stage) set_view('overlay');
+if (stage) set_view(page.comparison ? 'side' : 'overlay');
 const has_time = read_address();
 resize();
 new ResizeObserver(resize).observe(find('left'));

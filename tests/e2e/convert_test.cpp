@@ -68,6 +68,7 @@ void expect_contract(const fs::path& creature, bool stays_up) {
   std::set<std::string> files{"creature.toml", "appearance.bin", "body.json",   "target.bin", "signals.json",
                               "reference.glb", "report.json",    "report.html", "cache",      "rig.bin"};
   files.insert(stays_up ? "replay.glb" : "failed.glb");
+  if (effect_of(creature, "wobble").at("state") == "on") files.insert("wobble.bin");
   EXPECT_EQ(names_in(creature), files);
   const json report = report_of(creature);
   EXPECT_EQ(report.at("schema"), "hydrostat.report/1");
@@ -362,6 +363,7 @@ TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
   const std::string motion = motion_bytes(creature);
   hydrostat_in(directory.path, "replay creature --quiet");
   EXPECT_EQ(motion_bytes(creature), motion);
+  EXPECT_NE(io::read_file(creature / "report.html").find("What accuracy costs: "), std::string::npos);
 }
 
 TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {

@@ -28,6 +28,14 @@ inline nlohmann::json report_of(const std::filesystem::path& creature) {
   return nlohmann::json::parse(io::read_file(creature / "report.json"));
 }
 
+/// An effect as report.json tells it; empty where it does not.
+inline nlohmann::json effect_of(const std::filesystem::path& creature, const std::string& name) {
+  for (const nlohmann::json& effect : report_of(creature).at("effects")) {
+    if (effect.at("name") == name) return effect;
+  }
+  return {};
+}
+
 /// replay.glb, or failed.glb where the creature fell.
 inline std::string motion_bytes(const std::filesystem::path& creature) {
   const std::filesystem::path replay = creature / "replay.glb";

@@ -76,6 +76,31 @@ TEST_F(Replay, OnOtherLevelsIsTheSameEachTimeAndRefusesWhatCannotBe) {
   EXPECT_NE(old.err.find("rig.bin"), std::string::npos) << old.err;
 }
 
+TEST_F(Replay, WobblesInThePictureAlone) {
+  const auto motion = [&](const std::string& name, const std::string& options) {
+    const Outcome outcome = replay("--duration 0.5 -o " + name + ".glb --trace " + name + " " + options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return io::read_file(directory_.path / (name + ".glb"));
+  };
+  const std::string on = motion("on", "--wobble on --threads 1"), off = motion("off", "--wobble off");
+  EXPECT_NE(on.find("wobble 1"), std::string::npos);
+  EXPECT_EQ(off.find("wobble 1"), std::string::npos);
+  EXPECT_EQ(motion("again", "--wobble on --threads 2"), on);
+  for (const std::string& file : names_in(directory_.path / "on"))
+    EXPECT_EQ(io::read_file(directory_.path / "on" / file), io::read_file(directory_.path / "off" / file)) << file;
+  EXPECT_NE(motion("level", "--lod 60 --wobble on").find("wobble 1"), std::string::npos);
+  io::write_file(creature_ / "wobble.bin", "of another kind");
+  const Outcome damaged = replay("--duration 0.5 -o motion.glb");
+  EXPECT_EQ(damaged.exit_code, 1);
+  EXPECT_NE(damaged.err.find("wobble.bin"), std::string::npos) << damaged.err;
+  fs::remove(creature_ / "wobble.bin");
+  EXPECT_EQ(motion("bare", ""), off);
+  fs::remove(creature_ / "rig.bin");
+  EXPECT_EQ(motion("without_rig", "--wobble off"), off);
+  EXPECT_EQ(replay("--wobble on -o motion.glb").exit_code, 1);
+  EXPECT_EQ(replay("--wobble perhaps").exit_code, 2);
+}
+
 TEST_F(Replay, WithAFileOfItsOwnLeavesTheCreatureAlone) {
   const std::string motion = motion_bytes(creature_), report = io::read_file(creature_ / "report.json");
   const std::set<std::string> files = names_in(creature_);

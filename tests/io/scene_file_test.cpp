@@ -99,6 +99,24 @@ TEST_F(SceneFiles, HoldEveryShapeWithItsVolume) {
   }
 }
 
+TEST_F(SceneFiles, TellWhatOfAMeshTheyMend) {
+  const std::string needle = cube_obj(11) + "v 1 1 1.00000001\nf 4 9 6\nf 8 9 6\n";
+  std::string inward = cube_obj(12);
+  for (std::size_t at = inward.find("f "); at != std::string::npos; at = inward.find("f ", at + 1)) std::swap(inward[at + 4], inward[at + 6]);
+  write_file(directory.path / "needle.obj", needle);
+  write_file(directory.path / "inward.obj", inward);
+  const auto warnings = [&](const std::string& name) {
+    const SceneFile scene = read("[body]\nshape = \"mesh\"\nfile = \"" + name + "\"\n");
+    EXPECT_NEAR(std::get<ScenarioOf<3>>(scene.scenario).scene.body.mass.sum(), 1000, 1e-6);
+    return scene.warnings;
+  };
+  EXPECT_TRUE(warnings("cube.obj").empty());
+  ASSERT_EQ(warnings("needle.obj").size(), 1U);
+  EXPECT_EQ(warnings("needle.obj")[0], "'needle.obj': 1 of 13 triangles are needles; they are left out.");
+  ASSERT_EQ(warnings("inward.obj").size(), 1U);
+  EXPECT_EQ(warnings("inward.obj")[0], "'inward.obj': its triangles look inward; they are turned.");
+}
+
 TEST_F(SceneFiles, PlaceTheBody) {
   const auto bar = scenario<3>(
       "[body]\nshape = \"bar\"\nsize_m = [0.4, 0.2, 0.2]\nrotation_deg = [0, 0, 20]\ngap_m = 0.01\nvelocity_m_s = [1, 2, 3]\n"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
 #include <random>
 
 #include "physics/element_body.h"
@@ -118,6 +119,25 @@ TEST(Accuracy, OfAGivenSettingIsWithinTwiceItsEstimateInNineOfTen) {
     EXPECT_LT(estimate, 20 * error + 1e-3) << "seed " << seed;  // nor is it mere caution
   }
   EXPECT_GE(within, 0.9 * all);
+}
+
+/// Its dashpots, as strong as a large body's, ask the explicit method for steps of nanoseconds.
+TEST(Accuracy, OfATinyBodyIsFoundWithoutItsExplicitSteps) {
+  const physics::SimplexMeshOf<2> mesh = physics::mesh_of_box<2>({0.001, 0.00025}, {5, 2});
+  const physics::ElementMesh<2> elements{mesh.nodes, mesh.simplices, {{1000, 2000, 0.4}}, Eigen::VectorXd::Ones(mesh.simplices.cols())};
+  Scenario scenario;
+  scenario.scene.body = make_spring_body<2>(elements, 0.01);
+  scenario.scene.has_ground = true;
+  scenario.scene.body.rest.row(1).array() += 0.0005;
+  physics::touch_with_whole_surface(scenario.scene);
+  scenario.start = {scenario.scene.body.rest, physics::PointsOf<2>::Zero(2, mesh.nodes.cols())};
+  scenario.length = 0.001;
+  scenario.size = physics::size_of_volume<2>(scenario.scene.body.rest_volume.sum());
+  const std::clock_t begin = std::clock();
+  const double estimate = estimated_error(scenario, {.duration_s = 0.5});
+  EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 20);
+  EXPECT_GT(estimate, 0);
+  EXPECT_LT(estimate, 0.1);
 }
 
 TEST(Accuracy, ChoiceHangsOnNoClock) {

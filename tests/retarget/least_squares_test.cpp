@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
+#include <array>
 #include <limits>
 #include <random>
 #include <string>
@@ -106,11 +107,12 @@ TEST(BoundedLeastSquares, AgreesWithDescentAlongCoordinates) {
   }
 }
 
-TEST(BoundedLeastSquares, DualFormFindsTheSameEntries) {
-  for (unsigned seed = 0; seed < 20; ++seed) {
+TEST(BoundedLeastSquares, SaddlePointFormFindsTheSameEntries) {
+  for (unsigned seed = 0; seed < 24; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    constexpr int kCoupled = 12, kBounded = 30, kFree = 3, kColumns = kBounded + kFree;
-    BoundedLeastSquares problem = random_problem(seed, kBounded, kFree, kCoupled + kColumns, 0.5);
+    constexpr int kCoupled = 12, kBounded = 30;
+    const int free = std::array{0, 3, 20}[seed % 3], columns = kBounded + free;
+    BoundedLeastSquares problem = random_problem(seed, kBounded, free, kCoupled + columns, seed % 2 == 0 ? 0.5 : 0.1);
     // Below the coupled rows one entry a row, some columns with two.
     std::mt19937 random(seed);
     std::vector<Eigen::Triplet<double>> entries;
@@ -118,20 +120,20 @@ TEST(BoundedLeastSquares, DualFormFindsTheSameEntries) {
       for (decltype(problem.jacobian)::InnerIterator it(problem.jacobian, r); it; ++it)
         entries.emplace_back(r, it.col(), 100 * it.value());
     }
-    for (int c = 0; c < kColumns; ++c)
+    for (int c = 0; c < columns; ++c)
       entries.emplace_back(kCoupled + c, c == 5 ? 4 : c, c == 5 ? 0.3 : 0.1 + static_cast<double>(random() % 3));
     entries.emplace_back(kCoupled + 4, 4, 0.0);
-    problem.jacobian.resize(kCoupled + kColumns + 1, kColumns);
-    entries.emplace_back(kCoupled + kColumns, 5, 0.7);
+    problem.jacobian.resize(kCoupled + columns + 1, columns);
+    entries.emplace_back(kCoupled + columns, 5, 0.7);
     problem.jacobian.setFromTriplets(entries.begin(), entries.end());
-    problem.target.conservativeResize(kCoupled + kColumns + 1);
-    problem.target[kCoupled + kColumns] = 0.4;
-    problem.row_blocks.back() = kCoupled + kColumns + 1;
+    problem.target.conservativeResize(kCoupled + columns + 1);
+    problem.target[kCoupled + columns] = 0.4;
+    problem.row_blocks.back() = kCoupled + columns + 1;
     const BoundedSolution usual = solve(problem, middle_start(problem));
     problem.coupled_rows = kCoupled;
-    const BoundedSolution dual = solve(problem, middle_start(problem));
-    expect_optimal(problem, dual);
-    EXPECT_LT((dual.x - usual.x).lpNorm<Eigen::Infinity>(), 1e-8);
+    const BoundedSolution saddle = solve(problem, middle_start(problem));
+    expect_optimal(problem, saddle);
+    EXPECT_LT((saddle.x - usual.x).lpNorm<Eigen::Infinity>(), 1e-8);
   }
 }
 

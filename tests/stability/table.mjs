@@ -1,6 +1,8 @@
 // table.mjs STABILITY.csv [README.md]: the suite's table, a row a case: of how many runs how many passed, how much of the time
 // the guard stepped, and what failed. With a README, puts it between its marks. Exit code 1 where a run failed.
-import {readFileSync, renameSync, writeFileSync} from 'node:fs';
+import {readFileSync} from 'node:fs';
+
+import {write_between_marks} from '../../samples/between_marks.mjs';
 
 const [csv, readme] = process.argv.slice(2);
 const rows = readFileSync(csv, 'utf8').trim().split('\n').slice(1).map((line) => line.split(','));
@@ -22,15 +24,5 @@ const table = [
 ].join('\n');
 console.log(table);
 
-if (readme) {
-  const begin = '<!-- tests/stability/run.sh -r writes this table -->', end = '<!-- end of the table -->';
-  const text = readFileSync(readme, 'utf8');
-  const from = text.indexOf(begin), to = text.indexOf(end);
-  if (from < 0 || to < from) {
-    console.error(`table.mjs: ${readme}: the marks are missing. Put '${begin}' and '${end}' around the table.`);
-    process.exit(2);
-  }
-  writeFileSync(`${readme}.part`, `${text.slice(0, from + begin.length)}\n${table}\n${text.slice(to)}`);
-  renameSync(`${readme}.part`, readme);
-}
+if (readme) write_between_marks(readme, 'tests/stability/run.sh -r', table);
 process.exit(rows.every(passed) ? 0 : 1);

@@ -99,10 +99,11 @@ ChosenStep choose(const SimulateCommand& command, io::SceneFile& scene) {
       scene.scenario);
 }
 
+/// `written`: with the body as the files have it.
 template <int Dim>
-void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& scenario,
+void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& scenario, const retarget::ScenarioOf<Dim>& written,
                  const retarget::SimulationOptions& options, retarget::RunReport& report) {
-  const physics::BodyOf<Dim>& body = scenario.scene.body;
+  const physics::BodyOf<Dim>& body = written.scene.body;
   report.source.file = scene.file;
   report.source.sha256 = scene.sha256;
   report.source.duration_s = options.duration_s;
@@ -112,7 +113,7 @@ void fill_report(const io::SceneFile& scene, const retarget::ScenarioOf<Dim>& sc
   report.body.elements = body.tet_count();
   if (!body.elements.empty()) report.body.elements = body.elements.front().block.element_count();
   report.body.constraints = body.edge_count();
-  report.body.vertices = scenario.scene.contact_points.count();
+  report.body.vertices = written.scene.contact_points.count();
   report.body.mass_kg = body.mass.sum();
   report.body.length_m = scenario.length;
   report.body.size_m = scenario.size;
@@ -154,14 +155,17 @@ void write_files(io::CreatureWriter& writer, const io::SceneFile& scene, const r
 
 std::string summary(const retarget::RunReport& report, const std::string& where) {
   const retarget::SimulationReport& run = *report.simulation;
-  char text[300];
+  char text[300], torn[80] = "";
+  if (!run.fractures.empty()) {
+    std::snprintf(torn, sizeof torn, "; broke at %.3f s, %d piece%s", run.fractures.front().time_s, run.pieces_end, run.pieces_end == 1 ? "" : "s");
+  }
   std::snprintf(text, sizeof text,
                 ": %.3g s of %d nodes by '%s'; travel %.3f L, volume error %.2f %% at most, penetration %.2f %% D, %d "
                 "inverted elements; "
                 "%.1fx real time",
                 run.duration_s, report.body.nodes, report.accuracy.method.c_str(), run.travel_length,
                 100 * run.volume_error_max, 100 * run.penetration_max_size, run.inverted_elements, run.real_time_factor);
-  return where + text;
+  return where + text + torn;
 }
 
 int tell(const SimulateCommand& command, const retarget::RunReport& report) {
@@ -196,8 +200,8 @@ int simulate(const SimulateCommand& command) {
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   const retarget::Simulation simulation = std::visit(
       [&](auto& scenario) {
-        const auto& body = scenario.scene.body;
-        refuse_large_trace(command, options, body.node_count(), body.edge_count());
+        auto written = retarget::written_scenario(scenario);
+        refuse_large_trace(command, options, written.scene.body.node_count(), written.scene.body.edge_count());
         // A second thread measures the error meanwhile; without one it is done when it is asked for.
         std::future<double> error = std::async(
             command.threads > 1 ? std::launch::async : std::launch::deferred, [alone = scenario, &options, &command] {
@@ -206,10 +210,11 @@ int simulate(const SimulateCommand& command) {
         scenario.scene.threads = std::max(1, command.threads - 1);
         retarget::Simulation run = stages.run("simulation", [&] { return retarget::simulate(scenario, options); });
         stages.run("measurement", [&] {
-          fill_report(scene, scenario, options, report);
+          fill_report(scene, scenario, written, options, report);
           if (!command.accuracy.is_asked()) report.accuracy.estimated_error_length = error.get();
           return 0;
         });
+        scenario = std::move(written);
         return run;
       },
       scene.scenario);

@@ -26,6 +26,7 @@ class Group {
   void add(const char* key, int value) { json_[key] = value; }
   void add(const char* key, bool value) { json_[key] = value; }
   void add(const char* key, const std::string& value) { json_[key] = value; }
+  void add(const char* key, Json value) { json_[key] = std::move(value); }
   void add_nothing(const char* key) { json_[key] = nullptr; }
 
   Json take() { return std::move(json_); }
@@ -162,6 +163,12 @@ void fill(Group& group, const retarget::SimulationReport& simulation) {
   group.add("speed_end_m_s", simulation.speed_end_m_s);
   group.add("ms_per_sim_s", simulation.ms_per_sim_s);
   group.add("real_time_factor", simulation.real_time_factor);
+  Json fractures = Json::array();
+  for (const retarget::BreakReport& one : simulation.fractures) {
+    fractures.push_back({{"time_s", one.time_s}, {"seam", one.seam}, {"faces", one.faces}, {"pieces", one.pieces}});
+  }
+  group.add("fractures", std::move(fractures));
+  group.add("pieces_end", simulation.pieces_end);
 }
 
 void fill(Group& group, const retarget::EffectReport& effect) {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "io/fingerprint.h"
+#include "io/scene_seams.h"
 #include "io/scene_shapes.h"
 #include "io/toml_reader.h"
 #include "physics/element_body.h"
@@ -43,6 +44,7 @@ class SceneReader {
     scenario_.origin = kOrigins * (body->numbers_or("position_m", VectorOf<Dim>::Zero(), kPlace) / kOrigins).array().round();
     mesh_ = body_mesh<Dim>(*body, scene_.shape, scene_.element, cells_, scene_.warnings);
     read_material();
+    if (!root_.tables("seam").empty()) scenario_.fracture = read_seams<Dim>(root_, mesh_, make_body_, scenario_.youngs_modulus);
     for (const TomlReader& wave : root_.tables("activation")) read_wave(wave);
     refuse_vanishing();
     read_surroundings();
@@ -111,15 +113,16 @@ class SceneReader {
       scenario_.youngs_modulus = std::max(scenario_.youngs_modulus, material.youngs_modulus);
     }
     if (is_calibrated) calibrate();
-    if (scene_.law == kSprings) {
-      scenario_.scene.body = retarget::make_spring_body<Dim>(mesh_, damping_time);
-    } else {
-      const physics::ElasticLaw law =
-          scene_.law == "stable_neo_hookean" ? physics::ElasticLaw::kStableNeoHookean : physics::ElasticLaw::kCorotatedLinear;
-      scenario_.scene.body = physics::make_body<Dim>(mesh_, physics::ElementBodyOptions{law, 0, damping_time});
-    }
+    make_body_ = maker_of(scene_.law, damping_time);
+    scenario_.scene.body = make_body_(mesh_);
     scenario_.length = (mesh_.rest.rowwise().maxCoeff() - mesh_.rest.rowwise().minCoeff()).maxCoeff();
     scenario_.size = physics::size_of_volume<Dim>(scenario_.scene.body.rest_volume.sum());
+  }
+
+  static BodyMaker<Dim> maker_of(const std::string& name, double damping_time) {
+    if (name == kSprings) return [=](const physics::ElementMesh<Dim>& mesh) { return retarget::make_spring_body<Dim>(mesh, damping_time); };
+    const physics::ElasticLaw law = name == "stable_neo_hookean" ? physics::ElasticLaw::kStableNeoHookean : physics::ElasticLaw::kCorotatedLinear;
+    return [=](const physics::ElementMesh<Dim>& mesh) { return physics::make_body<Dim>(mesh, physics::ElementBodyOptions{law, 0, damping_time}); };
   }
 
   /// The elements get less of Young's modulus, so that the body gives way as its cells would. How much hangs on Poisson's ratio,
@@ -305,6 +308,7 @@ class SceneReader {
     const std::string broken = retarget::plan_effects<Dim>(wishes, scenario_);
     if (!broken.empty()) throw root_.refusal("effects", broken, "Add what it needs, or leave the effect to 'auto'.");
     retarget::SelfContactPlan plan = retarget::plan_self_contact<Dim>(scenario_, start, wishes["self_contact"], friction);
+    retarget::plan_parts_contact<Dim>(start, wishes["self_contact"], friction, scenario_, plan);
     scene.self_contact = std::move(plan.settings);
     scenario_.self_contact_reason = std::move(plan.reason);
   }
@@ -327,11 +331,11 @@ class SceneReader {
     scenario_.pushes.push_back(push);
   }
 
-
   const TomlReader& root_;
   SceneFile& scene_;
   physics::ElementMesh<Dim> mesh_;  // the rest shape in its own frame
   Eigen::MatrixXi cells_;           // nodes of the boxes that its tets or triangles are cut from; may be empty
+  BodyMaker<Dim> make_body_;
   ScenarioOf<Dim> scenario_;
   Eigen::VectorXd most_activation_;  // E
 };
@@ -369,7 +373,7 @@ SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsig
   }
   const TomlReader root(table, file, "");
   for (const char* key : {"dimension", "dt_s", "duration_s", "seed", "method", "gravity_m_s2", "body", "material", "region", "ground",
-                          "obstacle", "clamp", "activation", "push", "water", "air", "effects"}) {
+                          "obstacle", "clamp", "seam", "activation", "push", "water", "air", "effects"}) {
     root.has(key);
   }
   root.refuse_others();

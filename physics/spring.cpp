@@ -1,4 +1,5 @@
 #include "physics/element_constraint.h"
+#include "physics/springs_alone.h"
 #include "physics/stepper.h"
 
 namespace hydrostat::physics {
@@ -6,24 +7,10 @@ namespace {
 
 constexpr double kMostSubsteps = 1e5;  // of a step: nothing else takes over
 
-/// The same scene with a body that is springs and dashpots along its edges, and nothing else. An element's pairs get springs
-/// that together hold as much as it (make_body's rule, shared out over its pairs): Poisson's ratio is that of central forces.
 template <int Dim>
-SceneOf<Dim> springs_alone(const SceneOf<Dim>& scene) {
+SceneOf<Dim> with_springs_alone(const SceneOf<Dim>& scene) {
   SceneOf<Dim> result = scene;
-  BodyOf<Dim>& body = result.body;
-  body.volume_stiffness.resize(0);
-  body.elements.clear();
-  for (const BodyElements<Dim>& elements : scene.body.elements) {
-    const Eigen::MatrixXi& edges = elements.fit.of_element;
-    for (Eigen::Index e = 0; e < edges.cols(); ++e) {
-      const double modulus = youngs_modulus_times_volume(elements.block, static_cast<int>(e));
-      for (Eigen::Index p = 0; p < edges.rows(); ++p) {
-        const double length = body.rest_length[edges(p, e)];
-        body.edge_stiffness[edges(p, e)] += kEdgesPerTet<Dim> * modulus / (static_cast<double>(edges.rows()) * length * length);
-      }
-    }
-  }
+  result.body = springs_alone(scene.body);
   return result;
 }
 
@@ -35,7 +22,7 @@ template <int Dim>
 class SpringStepper final : public StepperOf<Dim> {
  public:
   explicit SpringStepper(const SceneOf<Dim>& scene)
-      : scene_(scene), springs_(springs_alone(scene)), stepper_(make_explicit_stepper(springs_, kMostSubsteps)) {}
+      : scene_(scene), springs_(with_springs_alone(scene)), stepper_(make_explicit_stepper(springs_, kMostSubsteps)) {}
 
   double substep(double dt) const override { return stepper_->substep(dt); }
 
@@ -58,6 +45,26 @@ class SpringStepper final : public StepperOf<Dim> {
 };
 
 }  // namespace
+
+template <int Dim>
+BodyOf<Dim> springs_alone(const BodyOf<Dim>& body) {
+  BodyOf<Dim> springs = body;
+  springs.volume_stiffness.resize(0);
+  springs.elements.clear();
+  for (const BodyElements<Dim>& elements : body.elements) {
+    const Eigen::MatrixXi& edges = elements.fit.of_element;
+    for (Eigen::Index e = 0; e < edges.cols(); ++e) {
+      const double modulus = youngs_modulus_times_volume(elements.block, static_cast<int>(e));
+      for (Eigen::Index p = 0; p < edges.rows(); ++p) {
+        const double length = body.rest_length[edges(p, e)];
+        springs.edge_stiffness[edges(p, e)] += kEdgesPerTet<Dim> * modulus / (static_cast<double>(edges.rows()) * length * length);
+      }
+    }
+  }
+  return springs;
+}
+template BodyOf<2> springs_alone<2>(const BodyOf<2>&);
+template BodyOf<3> springs_alone<3>(const BodyOf<3>&);
 
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_spring_stepper(const SceneOf<Dim>& scene) {

@@ -105,7 +105,13 @@ template <int Dim>
 std::vector<WindowOf<Dim>> windows_along(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options,
                                          const StepSetting& setting) {
   const auto whole = std::max(1.0, std::round(options.duration_s / options.frame_s));
-  const WindowOf<Dim> all{0, whole * options.frame_s, scenario.start};
+  WindowOf<Dim> all{0, whole * options.frame_s, scenario.start};
+  if (scenario.fracture) {
+    // A body's parts go where the step at which it broke sends them: what is compared ends before that.
+    const std::vector<BreakReport> breaks = simulate(scenario, options_for(all, setting, options.frame_s)).report.fractures;
+    const double until = breaks.empty() ? all.duration_s : breaks.front().time_s - setting.dt_s;
+    all.duration_s = std::max(1.0, std::floor(until / options.frame_s + 1e-9)) * options.frame_s;
+  }
   const bool may_touch = scenario.scene.has_ground || !scenario.scene.obstacles.empty();
   if (!may_touch && !scenario.scene.self_contact.is_on) return {all};
   SimulationOptions path = options_for(all, setting, options.frame_s);
@@ -117,11 +123,12 @@ std::vector<WindowOf<Dim>> windows_along(const ScenarioOf<Dim>& scenario, const 
   std::vector<WindowOf<Dim>> windows;
   for (int k = 0; k < options.windows; ++k) {
     const auto f = static_cast<Eigen::Index>(std::floor(last * k / std::max(1, options.windows - 1)));
-    WindowOf<Dim> window{static_cast<double>(f) * options.frame_s, std::min(frames, whole) * options.frame_s,
+    WindowOf<Dim> window{static_cast<double>(f) * options.frame_s, std::min(frames * options.frame_s, all.duration_s),
                          scenario.start};
     if (!windows.empty() && window.begin_s <= windows.back().begin_s) continue;
-    window.start.x = run.motion.at(f).template topRows<Dim>();
-    window.start.v = run.velocities[static_cast<std::size_t>(f)].template topRows<Dim>();
+    const Eigen::Index nodes = scenario.start.x.cols();  // before copies of them, where the body can split
+    window.start.x = run.motion.at(f).template topRows<Dim>().leftCols(nodes);
+    window.start.v = run.velocities[static_cast<std::size_t>(f)].template topRows<Dim>().leftCols(nodes);
     window.start.obstacle_travel.resize(Dim, static_cast<Eigen::Index>(run.obstacle_travels.size()));
     for (std::size_t o = 0; o < run.obstacle_travels.size(); ++o) {
       window.start.obstacle_travel.col(static_cast<Eigen::Index>(o)) =

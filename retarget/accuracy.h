@@ -50,7 +50,8 @@ struct ReferenceOf {
   double uncertainty_m() const;
 };
 
-/// Follows the motion from the scenario's start; with contact its windows start on the way. The second method is only asked
+/// Follows the motion from the scenario's start, of a body that splits until it first breaks; with contact its windows start on
+/// the way. The second method is only asked
 /// where `is_checked`.
 template <int Dim>
 ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options, bool is_checked = true);

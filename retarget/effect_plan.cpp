@@ -11,6 +11,7 @@ using physics::VectorOf;
 
 constexpr double kExtent = 2;  // of L [-]: no part of a body that nothing holds is farther from its centre of mass
 constexpr double kLeastResistance = 0.005;  // of the weight [-]: less is not seen
+constexpr double kLeastSpeed = 1e-9;        // beside that of the whole body, over it [-]: less is rounding
 constexpr double kGravity = 9.81;           // [m/s2] of the weight where there is none
 
 std::string number(double value, int digits = 2) {
@@ -51,6 +52,7 @@ class Planner {
     decide("pushes", !scenario_.pushes.empty(), !scenario_.pushes.empty(),
            std::to_string(scenario_.pushes.size()) + " in the scene", "the scene has none");
     if (!is_on("pushes")) scenario_.pushes.clear();
+    decide_fracture();
     return broken_;
   }
 
@@ -168,6 +170,33 @@ class Planner {
     if (!is_on("damping")) body.edge_damping.setZero();
   }
 
+  void decide_fracture() {
+    const std::string load = load_of_seams();
+    std::string why_not = "no seam is marked", why;
+    if (scenario_.fracture) {
+      why = many(scenario_.fracture->seams.size(), "seam") + " of " + std::to_string(scenario_.fracture->faces.size()) + " faces, which " + load +
+            " can load";
+      why_not = "nothing can load the seams";
+    }
+    decide("fracture", scenario_.fracture.has_value(), scenario_.fracture && !load.empty(), why, why_not);
+    if (!is_on("fracture")) scenario_.fracture.reset();
+  }
+
+  /// What can pull at the body's inside; empty: nothing.
+  std::string load_of_seams() const {
+    const bool meets = is_on("ground") || is_on("obstacles") || !scenario_.clamps.empty();
+    if (!scenario_.waves.empty() || scenario_.drive) return "activations";
+    if (is_on("gravity") && meets) return "the weight";
+    if (is_on("pushes") && meets) return "pushes";
+    if (!scenario_.moves.empty()) return "moving obstacles";
+    if (is_on("water")) return "water";
+    if (is_on("air_drag")) return "air";
+    if ((scenario_.start.v.colwise() - velocity_).norm() > kLeastSpeed * scenario_.start.v.norm()) return "what moves at the start";
+    if (meets && velocity_.norm() > 0) return "an impact";
+    const bool is_in_shape = scenario_.start.x == scene_.body.rest;
+    return is_in_shape ? "" : "the start out of shape";
+  }
+
   const std::map<std::string, Wish>& wishes_;
   ScenarioOf<Dim>& scenario_;
   physics::SceneOf<Dim>& scene_;
@@ -179,7 +208,7 @@ class Planner {
 
 const std::vector<std::string>& switchable_effects() {
   static const std::vector<std::string> names{"gravity", "ground",   "friction", "obstacles", "volume",
-                                              "damping", "air_drag", "water",    "pushes"};
+                                              "damping", "air_drag", "water",    "pushes",   "fracture"};
   return names;
 }
 

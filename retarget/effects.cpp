@@ -100,7 +100,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
        ms(embedding * kFramesPerSecond)},
       {"wobble", wobbles ? "on" : "off", performer.wobble.reason,
        wobbles ? ms(wobble_seconds(performer) * performer.prepared.target.rate_hz) : 0},
-      {"fracture", "off", "not simulated in this version: the body does not tear", 0},
+      {"fracture", "off", "a creature has no seams; scenes have [[seam]]", 0},
   };
 }
 

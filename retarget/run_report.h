@@ -59,6 +59,14 @@ struct ReplayReport {
   double apex_rise_length = 0, clip_apex_rise_length = 0;  // of the COM over its height at the start, per L
 };
 
+/// Faces of a seam that broke in one step.
+struct BreakReport {
+  double time_s = 0;
+  int seam = 0;    // as the scene counts them, from 0
+  int faces = 0;
+  int pieces = 1;  // of the body after the step
+};
+
 /// A scene's simulation, without a clip. Energies are per m g L with g = 9.81 m/s2.
 struct SimulationReport {
   int dimension = 3;
@@ -77,6 +85,8 @@ struct SimulationReport {
   double travel_length = 0;  // of the COM over the ground's plane
   double speed_max_m_s = 0, speed_end_m_s = 0;  // of the fastest node
   double ms_per_sim_s = 0, real_time_factor = 0;
+  std::vector<BreakReport> fractures;  // in the order of time
+  int pieces_end = 1;                  // that share no node
 };
 
 struct EffectReport {

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "physics/element_block.h"
+#include "physics/seam.h"
 #include "physics/simplex_mesh.h"
 #include "physics/stepper.h"
 #include "retarget/push.h"
@@ -53,6 +55,7 @@ struct ScenarioOf {
   std::function<void(double time_s, Eigen::VectorXd& activation)> drive = {};
   std::vector<PushOf<Dim>> pushes;
   std::vector<MoveOf<Dim>> moves;
+  std::optional<physics::FractureOf<Dim>> fracture = {};  // how the body splits, where it can
   std::vector<Clamp> clamps;  // those that hold at the start are the scene's body's `held`
   physics::VectorOf<Dim> origin = physics::VectorOf<Dim>::Zero();  // [m] the local one in the world
   double length = 1, size = 1;  // L [m], longest extent of the rest shape's box; D [m]

@@ -3,6 +3,7 @@
 
 #include "physics/elastic_forces.h"
 #include "physics/fluid.h"
+#include "physics/tearing.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/simulation.h"
 
@@ -63,6 +64,19 @@ double ms_of_volume(const physics::BodyOf<Dim>& body, const physics::StateOf<Dim
   return std::max(0.0, all - ms_of([&] { physics::add_elastic_forces(springs, state.x, activation, force); }));
 }
 
+/// Of the whole body.
+template <int Dim>
+double ms_of_fracture(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
+  if (!scenario.fracture) return 0;
+  const physics::BodyOf<Dim>& body = scenario.scene.body;
+  const std::vector<char> is_broken(scenario.fracture->faces.size(), 0);
+  const physics::SplitMesh<Dim> apart =
+      physics::split_mesh(scenario.fracture->mesh, scenario.fracture->faces, std::vector<char>(is_broken.size(), 1));
+  physics::SeamWatch<Dim> watch(*scenario.fracture, body, apart, options.method == physics::Method::kSpring);
+  const Eigen::VectorXd passive = Eigen::VectorXd::Ones(body.edge_count());
+  return 1000 / options.dt_s * seconds_of([&] { watch.tensions(body.rest, passive, is_broken); });
+}
+
 }  // namespace
 
 template <int Dim>
@@ -115,7 +129,8 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
   tell("pushes", pushed, "the scene has none", "", pushed ? ms_of([&] { force += state.v; }) : 0);
   tell("embedding", false, "the skin is the mesh's own surface", "", 0);
   tell("wobble", false, "of creatures alone: what is seen of a scene are its nodes", "", 0);
-  tell("fracture", false, "not simulated in this version: the body does not tear", "", 0);
+  tell("fracture", scenario.fracture.has_value(), "no seam is marked", "one pass over what touches the seams a step",
+       ms_of_fracture(scenario, options));
   return effects;
 }
 template std::vector<EffectReport> effects_of<2>(const ScenarioOf<2>&, const SimulationOptions&);

@@ -123,6 +123,16 @@ SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape st
                               slenderness, 100 * kRing / slenderness));
 }
 
+template <int Dim>
+void plan_parts_contact(StartShape start, Wish wish, double friction, ScenarioOf<Dim>& scenario, SelfContactPlan& plan) {
+  if (!scenario.fracture) return;
+  scenario.fracture->self_contact = plan.settings;
+  if (plan.settings.is_on || wish == Wish::kOff || start != StartShape::kRest) return;
+  scenario.fracture->self_contact.is_on = true;
+  scenario.fracture->self_contact.friction = friction;
+  plan.reason += "; once it breaks its parts touch each other";
+}
+
 SelfContactPlan plan_self_contact(const Performer& performer) {
   const physics::Body& body = performer.scene.body;
   const double cell = body.rest_length.mean();
@@ -182,6 +192,8 @@ SelfContactPlan plan_self_contact(const Performer& performer) {
   return plan;
 }
 
+template void plan_parts_contact<2>(StartShape, Wish, double, ScenarioOf<2>&, SelfContactPlan&);
+template void plan_parts_contact<3>(StartShape, Wish, double, ScenarioOf<3>&, SelfContactPlan&);
 template SelfContactPlan plan_self_contact<2>(const ScenarioOf<2>&, StartShape, Wish, double);
 template SelfContactPlan plan_self_contact<3>(const ScenarioOf<3>&, StartShape, Wish, double);
 

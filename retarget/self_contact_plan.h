@@ -23,6 +23,11 @@ struct SelfContactPlan {
 template <int Dim>
 SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape start, Wish wish, double friction);
 
+/// Of the parts of a body that splits, from its first break on: as the whole body is where that touches itself, and else on
+/// unless it is turned off or the body starts out of shape. Left in the scenario's fracture; adds to the plan's reason.
+template <int Dim>
+void plan_parts_contact(StartShape start, Wish wish, double friction, ScenarioOf<Dim>& scenario, SelfContactPlan& plan);
+
 /// Of a creature: on where the target brings parts within a cell of each other that are four or more apart in the bind
 /// pose, and between these alone.
 SelfContactPlan plan_self_contact(const Performer& performer);

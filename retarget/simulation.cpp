@@ -7,7 +7,9 @@
 #include "physics/effect.h"
 #include "physics/internal_forces.h"
 #include "physics/self_contact.h"
+#include "physics/tearing.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/simulation_record.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -23,21 +25,6 @@ Eigen::Vector3d in_space(const VectorOf<Dim>& place) {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   point.head<Dim>() = place;
   return point;
-}
-
-/// A column as Motion and Trace hold it: x0 y0 z0 x1 ...
-template <int Dim>
-Eigen::VectorXd column_of(const PointsOf<Dim>& points) {
-  Eigen::Matrix3Xd all = Eigen::Matrix3Xd::Zero(3, points.cols());
-  all.template topRows<Dim>() = points;
-  return all.reshaped();
-}
-
-template <int Dim>
-Eigen::Vector3d moment_of(const SpinOf<Dim>& spin) {
-  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-  moment.tail<SpinOf<Dim>::RowsAtCompileTime>() = spin;
-  return moment;
 }
 
 /// The deepest that a contact point lies in ground or obstacles [m].
@@ -58,24 +45,6 @@ double penetration(const physics::SceneOf<Dim>& scene, const physics::StateOf<Di
   return deepest;
 }
 
-/// What a row of the trace sums up over its steps.
-template <int Dim>
-struct RowSums {
-  PointsOf<Dim> contact, effect;
-  SpinOf<Dim> contact_moment = SpinOf<Dim>::Zero(), effect_moment = SpinOf<Dim>::Zero();
-  Eigen::VectorXd activation;
-  int steps = 0;
-
-  void clear() {
-    contact.setZero();
-    effect.setZero();
-    contact_moment.setZero();
-    effect_moment.setZero();
-    activation.setZero();
-    steps = 0;
-  }
-};
-
 /// One free simulation, step by step.
 template <int Dim>
 class Course {
@@ -90,13 +59,16 @@ class Course {
   };
   Energy energy() const;
   double now() const { return options_.begin_s + static_cast<double>(done_) * options_.dt_s; }
+  bool is_split() const { return activation_split_.size() > 0; }
+  const Eigen::VectorXd& activation_now() const { return is_split() ? activation_split_ : activation_; }
   void drive(double time_s);
   void set_velocities(double begin);
   void let_go();
+  void tear();
+  void go_on_anew();
   physics::Termination step();
   SpinOf<Dim> hold_moment() const;
   void measure();
-  void write_row(Eigen::Index row);
   void write_frame();
   void tell_divergence();
   Simulation finish();
@@ -105,12 +77,15 @@ class Course {
   const SimulationOptions& options_;
   physics::SceneOf<Dim> scene_;  // a copy, whose obstacles change their velocities
   const physics::BodyOf<Dim>& body_;
+  std::optional<physics::Tearing<Dim>> tearing_;  // where the body can split
+  SimulationRecord<Dim> record_;
   std::unique_ptr<physics::StepperOf<Dim>> stepper_;
-  const std::vector<std::unique_ptr<physics::EffectOf<Dim>>> effects_;
-  physics::InternalForces<Dim> forces_;
-  physics::SelfContactSet<Dim> itself_;
+  std::vector<std::unique_ptr<physics::EffectOf<Dim>>> effects_;
+  std::optional<physics::InternalForces<Dim>> forces_;
+  std::optional<physics::SelfContactSet<Dim>> itself_;
   const long steps_, steps_per_frame_;
   const double mass_, weight_, rest_volume_;
+  const VectorOf<Dim> centre_at_start_;
   const double energy_of_origin_;  // [J] of the whole mass in the local origin, in the field of gravity
 
   long done_ = 0;
@@ -118,17 +93,18 @@ class Course {
   double next_release_s_ = 1e300;
   double busy_s_ = 0, work_ = 0, energy_at_start_ = 0;
   physics::StateOf<Dim> state_, before_;
-  Eigen::VectorXd activation_;
+  Eigen::VectorXd activation_;        // of the whole body
+  Eigen::VectorXd activation_split_;  // of the body as it is now, once it has split
   physics::ImpulsesOf<Dim> impulses_;
   PointsOf<Dim> effect_;
-  RowSums<Dim> sums_;
-  Eigen::Index rows_ = 0;
-  std::vector<Eigen::VectorXd> frames_;
-  std::vector<PointsOf<Dim>> travels_;
-  std::vector<std::array<double, 9>> course_;
-  std::vector<Eigen::Vector3d> com_;
   Simulation result_;
 };
+
+template <int Dim>
+std::optional<physics::Tearing<Dim>> plan_tearing(const ScenarioOf<Dim>& scenario, physics::Method method) {
+  if (!scenario.fracture) return std::nullopt;
+  return std::optional<physics::Tearing<Dim>>(std::in_place, *scenario.fracture, scenario.scene.body, method == physics::Method::kSpring);
+}
 
 template <int Dim>
 Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& options)
@@ -136,15 +112,16 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       options_(options),
       scene_(scenario.scene),
       body_(scene_.body),
+      tearing_(plan_tearing(scenario, options.method)),
+      record_(scenario, options, tearing_ ? tearing_->apart() : body_),
       stepper_(physics::make_stepper(options.method, scene_)),
       effects_(physics::plan_effects(scene_)),
-      forces_(body_),
-      itself_(scene_),
       steps_(std::max(1L, std::lround(options.duration_s / options.dt_s))),
       steps_per_frame_(std::max(1L, std::lround(1 / (options.frame_rate_hz * options.dt_s)))),
       mass_(body_.mass.sum()),
       weight_(kGravity * mass_),
       rest_volume_(body_.rest_volume.sum()),
+      centre_at_start_(physics::centre_of_mass(body_, scenario.start.x)),
       energy_of_origin_(-mass_ * scene_.gravity.dot(scenario.origin)),
       state_(scenario.start),
       before_(state_),
@@ -152,8 +129,11 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
       impulses_(physics::make_impulses(scene_)),
       effect_(Dim, body_.node_count()) {
   if (state_.obstacle_travel.cols() == 0) state_.obstacle_travel.setZero(Dim, static_cast<Eigen::Index>(scene_.obstacles.size()));
+  forces_.emplace(body_);
+  itself_.emplace(scene_);
+  if (tearing_) record_.follow({tearing_->node_now(), tearing_->mass_share(), tearing_->apart_edges()});
   drive(options.begin_s + 0.5 * options.dt_s);
-  forces_.set_activation(activation_);
+  forces_->set_activation(activation_);
   for (const Clamp& clamp : scenario.clamps) {
     if (clamp.until_s > options.begin_s) next_release_s_ = std::min(next_release_s_, clamp.until_s);
   }
@@ -161,20 +141,13 @@ Course<Dim>::Course(const ScenarioOf<Dim>& scenario, const SimulationOptions& op
   SimulationReport& report = result_.report;
   report.dimension = Dim;
   report.energy_start_mgl = (energy_at_start_ + energy_of_origin_) / (weight_ * scenario.length);
-  sums_.contact = sums_.effect = effect_;
-  sums_.activation = activation_;
-  sums_.clear();
-  if (options.trace) {
-    result_.trace = empty_trace(body_, steps_ / options.steps_per_row + 1);
-    result_.trace.activation.col(0) = activation_;
-    write_row(0);
-  }
+  if (options.trace) record_.begin_trace(state_, activation_);
   write_frame();
 }
 
 template <int Dim>
 typename Course<Dim>::Energy Course<Dim>::energy() const {
-  return {0.5 * state_.v.colwise().squaredNorm().dot(body_.mass), forces_.elastic_energy(state_.x),
+  return {0.5 * state_.v.colwise().squaredNorm().dot(body_.mass), forces_->elastic_energy(state_.x),
           -scene_.gravity.dot(state_.x * body_.mass)};
 }
 
@@ -193,14 +166,45 @@ void Course<Dim>::set_velocities(double begin) {
 template <int Dim>
 void Course<Dim>::let_go() {
   hold_at(scenario_.clamps, now(), scene_.body.held);
+  if (tearing_) scene_.body.held = physics::copies_of(scene_.body.held, tearing_->origin_now());
   next_release_s_ = 1e300;
   for (const Clamp& clamp : scenario_.clamps) {
     if (clamp.until_s > now()) next_release_s_ = std::min(next_release_s_, clamp.until_s);
   }
+  go_on_anew();
+}
+
+template <int Dim>
+void Course<Dim>::go_on_anew() {
   guard_steps_ += stepper_->guard_steps();
   result_.work = result_.work + stepper_->work();
   stepper_ = physics::make_stepper(options_.method, scene_);
   impulses_ = physics::make_impulses(scene_);
+}
+
+/// Breaks what bears too much; the same method goes on with the body that is left.
+template <int Dim>
+void Course<Dim>::tear() {
+  const double began = thread_seconds();
+  const std::vector<int> broken = tearing_->break_loaded(state_, activation_);
+  if (!broken.empty() && tearing_->split(scene_, state_)) {
+    go_on_anew();
+    before_ = state_;
+    activation_split_ = activation_(tearing_->edges_now());
+    effects_ = physics::plan_effects(scene_);
+    effect_.resize(Dim, body_.node_count());
+    forces_.emplace(body_);
+    forces_->set_activation(activation_split_);
+    itself_.emplace(scene_);
+    record_.follow({tearing_->node_now(), tearing_->mass_share(), tearing_->apart_edges()});
+    result_.report.pieces_end = tearing_->part_count();
+  }
+  busy_s_ += thread_seconds() - began;
+  for (std::size_t s = 0; s < broken.size(); ++s) {
+    if (broken[s] == 0) continue;
+    const double time_s = static_cast<double>(done_) * options_.dt_s;
+    result_.report.fractures.push_back({time_s, static_cast<int>(s), broken[s], result_.report.pieces_end});
+  }
 }
 
 template <int Dim>
@@ -218,9 +222,10 @@ physics::Termination Course<Dim>::step() {
   before_ = state_;
   if (scenario_.drive || !scenario_.waves.empty()) {
     drive(begin + 0.5 * dt);
-    work_ -= forces_.elastic_energy(state_.x);
-    forces_.set_activation(activation_);
-    work_ += forces_.elastic_energy(state_.x);
+    if (is_split()) activation_split_ = activation_(tearing_->edges_now());
+    work_ -= forces_->elastic_energy(state_.x);
+    forces_->set_activation(activation_now());
+    work_ += forces_->elastic_energy(state_.x);
   }
   set_velocities(begin);
   if (begin >= next_release_s_) let_go();
@@ -229,7 +234,7 @@ physics::Termination Course<Dim>::step() {
   if (has_effect) effect_ = (pushed / dt) * body_.mass.transpose();
   const double began = thread_seconds();
   for (const auto& effect : effects_) effect->add_forces(dt, state_, effect_);
-  const physics::Termination termination = stepper_->step(dt, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
+  const physics::Termination termination = stepper_->step(dt, activation_now(), has_effect ? &effect_ : nullptr, state_, impulses_);
   busy_s_ += thread_seconds() - began;
   if (termination == physics::Termination::kDiverged) return termination;
   ++done_;
@@ -268,50 +273,23 @@ void Course<Dim>::measure() {
   report.inverted_elements_end = static_cast<int>((physics::jacobians(body_, state_.x).array() <= 0).count());
   report.inverted_elements = std::max(report.inverted_elements, report.inverted_elements_end);
   report.penetration_max_size = std::max(report.penetration_max_size, penetration(scene_, state_) / scenario_.size);
-  report.self_penetration_max_size = std::max(report.self_penetration_max_size, itself_.deepest(state_.x) / scenario_.size);
+  report.self_penetration_max_size = std::max(report.self_penetration_max_size, itself_->deepest(state_.x) / scenario_.size);
   report.speed_end_m_s = state_.v.colwise().norm().maxCoeff();
   report.speed_max_m_s = std::max(report.speed_max_m_s, report.speed_end_m_s);
   if (options_.trace) {
-    sums_.contact += impulses_.contact_nodes;
-    sums_.effect += impulses_.effect_nodes;
-    for (std::size_t n = 0; n < body_.held.size(); ++n) sums_.effect.col(body_.held[n]) += impulses_.hold.col(static_cast<Eigen::Index>(n));
-    sums_.contact_moment += impulses_.contact_moment;
-    sums_.effect_moment += impulses_.effect_moment + hold_moment();
-    sums_.activation += activation_;
-    if (++sums_.steps == options_.steps_per_row) write_row(done_ / options_.steps_per_row);
+    record_.add_step(impulses_, body_.held, hold_moment(), activation_);
+    if (record_.row_is_full()) record_.write_row(static_cast<double>(done_) * options_.dt_s, state_);
   }
-}
-
-template <int Dim>
-void Course<Dim>::write_row(Eigen::Index row) {
-  Trace& trace = result_.trace;
-  const double seconds = sums_.steps * options_.dt_s;
-  rows_ = row + 1;
-  trace.time_s[row] = static_cast<double>(done_) * options_.dt_s;
-  trace.position.col(row) = column_of<Dim>(state_.x.colwise() + scenario_.origin);
-  trace.velocity.col(row) = column_of<Dim>(state_.v);
-  if (sums_.steps == 0) return;
-  trace.contact_force.col(row) = column_of<Dim>(sums_.contact / seconds);
-  trace.effect_force.col(row) = column_of<Dim>(sums_.effect / seconds);
-  const VectorOf<Dim> contact = sums_.contact.rowwise().sum(), effect = sums_.effect.rowwise().sum();
-  const SpinOf<Dim> of_contact = sums_.contact_moment + physics::cross<Dim>(scenario_.origin, contact);
-  const SpinOf<Dim> of_effect = sums_.effect_moment + physics::cross<Dim>(scenario_.origin, effect);
-  trace.contact_moment.col(row) = moment_of<Dim>(of_contact / seconds);
-  trace.effect_moment.col(row) = moment_of<Dim>(of_effect / seconds);
-  trace.activation.col(row) = sums_.activation / sums_.steps;
-  sums_.clear();
 }
 
 template <int Dim>
 void Course<Dim>::write_frame() {
   const Energy here = energy();
-  frames_.push_back(column_of<Dim>(state_.x));
-  if (options_.velocities) result_.velocities.emplace_back(column_of<Dim>(state_.v).reshaped(3, state_.v.cols()));
-  travels_.push_back(state_.obstacle_travel);
-  com_.push_back(in_space<Dim>(physics::centre_of_mass(body_, state_.x) + scenario_.origin));
   const double force = impulses_.contact.colwise().norm().sum() / options_.dt_s;
-  course_.push_back({static_cast<double>(done_) * options_.dt_s, here.kinetic, here.elastic, here.gravity + energy_of_origin_, work_,
-                     physics::volume(body_, state_.x) / rest_volume_, penetration(scene_, state_), force / weight_, activation_.mean()});
+  record_.write_frame(state_, in_space<Dim>(physics::centre_of_mass(body_, state_.x) + scenario_.origin),
+                      {static_cast<double>(done_) * options_.dt_s, here.kinetic, here.elastic, here.gravity + energy_of_origin_, work_,
+                       physics::volume(body_, state_.x) / rest_volume_, penetration(scene_, state_), force / weight_,
+                       activation_.mean()});
 }
 
 template <int Dim>
@@ -336,6 +314,7 @@ Simulation Course<Dim>::play() {
       break;
     }
     if (options_.figures) measure();
+    if (tearing_) tear();
     if (done_ % steps_per_frame_ == 0) write_frame();
   }
   return finish();
@@ -351,31 +330,12 @@ Simulation Course<Dim>::finish() {
   report.work_mgl = work_ / (weight_ * scenario_.length);
   const Eigen::Vector3d up = in_space<Dim>(scene_.has_ground ? scene_.ground.normal : VectorOf<Dim>::UnitY());
   const Eigen::Vector3d way =
-      in_space<Dim>(physics::centre_of_mass(body_, state_.x) - physics::centre_of_mass(body_, scenario_.start.x));
+      in_space<Dim>(physics::centre_of_mass(body_, state_.x) - centre_at_start_);
   report.travel_length = (way - up * up.dot(way)).norm() / scenario_.length;
   if (report.duration_s > 0) report.ms_per_sim_s = 1000 * busy_s_ / report.duration_s;
   if (busy_s_ > 0) report.real_time_factor = report.duration_s / busy_s_;
 
-  const auto count = static_cast<Eigen::Index>(frames_.size());
-  Motion& motion = result_.motion;
-  motion.rate_hz = 1 / (static_cast<double>(steps_per_frame_) * options_.dt_s);
-  motion.frames.resize(frames_.front().size(), count);
-  result_.obstacle_travels.assign(scene_.obstacles.size(), {motion.rate_hz, Eigen::MatrixXd::Zero(3, count)});
-  SimulationCourse& course = result_.course;
-  course.com.resize(3, count);
-  Eigen::VectorXd* const columns[] = {&course.time_s, &course.kinetic_j, &course.elastic_j, &course.gravity_j, &course.work_j,
-                                      &course.volume_ratio, &course.penetration_m, &course.contact_weights, &course.mean_activation};
-  for (Eigen::VectorXd* column : columns) column->resize(count);
-  for (Eigen::Index f = 0; f < count; ++f) {
-    const auto frame = static_cast<std::size_t>(f);
-    motion.frames.col(f) = frames_[frame];
-    course.com.col(f) = com_[frame];
-    for (std::size_t k = 0; k < std::size(columns); ++k) (*columns[k])[f] = course_[frame][k];
-    for (std::size_t o = 0; o < scene_.obstacles.size(); ++o) {
-      result_.obstacle_travels[o].frames.template block<Dim, 1>(0, f) = travels_[frame].col(static_cast<Eigen::Index>(o));
-    }
-  }
-  if (options_.trace) shorten(result_.trace, rows_);
+  record_.finish(1 / (static_cast<double>(steps_per_frame_) * options_.dt_s), result_);
   return std::move(result_);
 }
 

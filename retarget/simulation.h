@@ -30,7 +30,8 @@ struct SimulationCourse {
   Eigen::VectorXd contact_weights;  // sizes of the forces at all contact points, added up
 };
 
-/// What came of a scene. In 2D, z = 0. Course, report and trace are of the world, moments about its origin.
+/// What came of a scene. In 2D, z = 0. Course, report and trace are of the world, moments about its origin. Motion, velocities and
+/// trace are those of the body of written_scenario.
 struct Simulation {
   Motion motion;                         // nodes, 3N x F, about the scenario's own origin
   std::vector<Motion> obstacle_travels;  // 3 x F, of each obstacle from where the scene has it
@@ -45,6 +46,11 @@ struct Simulation {
 /// handed over ends before that step. The options must break no rule.
 template <int Dim>
 Simulation simulate(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
+
+/// The scenario with its body as a simulation is written down: of one that can split with all its parts apart from the start, copies of
+/// a node lying on each other until they part. The first nodes are the whole body's. Any other scenario as it is.
+template <int Dim>
+ScenarioOf<Dim> written_scenario(const ScenarioOf<Dim>& scenario);
 
 /// Every effect that a scene can have: whether it is on, why, and what it costs, timed here on the scene's own body.
 template <int Dim>

@@ -110,6 +110,7 @@ double instructions(const fs::path& directory, const std::string& scene) {
       "cd '" + directory.string() +
       "' && valgrind --tool=callgrind --callgrind-out-file=counts "
       "--toggle-collect='*GuardedStepper<*>::step(*' --toggle-collect='*FluidEffect<*>::add_forces(*' "
+      "--toggle-collect='*Tearing<*>::break_loaded(*' "
       "'" HYDROSTAT_BINARY "' simulate " +
       scene + " -o out --threads 1 --quiet >log 2>&1";
   if (std::system(command.c_str()) != 0) return -1;
@@ -132,6 +133,11 @@ TEST_F(AccuracyCommands, AnEffectThatIsOffCostsNoInstruction) {
   ASSERT_GT(plain, 1e5);
   EXPECT_NEAR(off, plain, 1e-3 * plain);
   EXPECT_GT(on, 1.01 * plain);
+  const std::string seam = "[[seam]]\nnormal = [0.0, 1.0]\n[effects]\nfracture = ";
+  io::write_file(directory.path / "whole.toml", shape + seam + "\"off\"\n");
+  io::write_file(directory.path / "seamed.toml", shape + seam + "\"on\"\n");
+  EXPECT_NEAR(instructions(directory.path, "whole.toml"), plain, 1e-3 * plain);
+  EXPECT_GT(instructions(directory.path, "seamed.toml"), 1.01 * plain);
 }
 
 }  // namespace

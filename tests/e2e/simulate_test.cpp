@@ -123,6 +123,22 @@ TEST(Simulate, GivesTheSameBytesAgainAndReplacesWhatStoodThere) {
   EXPECT_EQ(io::read_file(directory.path / "out" / "notes.txt"), "mine");
 }
 
+TEST(Simulate, SwingingBarTearsAndItsLowerPartComesToLie) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = simulate(directory.path, scene_of("tearing_bar"), "--json --trace trace");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  expect_sound(audit_trace(directory.path / "trace", directory.path / "out"));
+  const nlohmann::json report = nlohmann::json::parse(outcome.out), &run = report.at("simulation");
+  ASSERT_FALSE(run.at("fractures").empty());
+  EXPECT_GT(run.at("fractures").front().at("time_s"), 0.3);  // not before the push
+  EXPECT_EQ(run.at("pieces_end"), 2);
+  EXPECT_EQ(run.at("inverted_elements_end"), 0);
+  EXPECT_LT(run.at("energy_excess_mgl"), 1e-3);
+  const auto position = io::read_npy_double(directory.path / "trace" / "position.npy");
+  EXPECT_EQ(position.shape.at(1), report.at("body").at("nodes"));
+  EXPECT_LT(audit::points(position, position.shape.at(0) - 1).row(1).minCoeff(), 0.01);  // it lies on the ground
+}
+
 TEST(Simulate, BallRecoversFromRandomPlaces) {
   const TemporaryDirectory directory;
   for (const std::string seed : {"1", "2"}) {

@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "io/scene_file.h"
 #include "io/write_file.h"
+#include "retarget/accuracy.h"
 #include "retarget/effect_bench.h"
 #include "retarget/effect_plan.h"
 #include "tests/io/refusal.h"
@@ -43,7 +45,7 @@ TEST_F(SceneEffects, AreOnWhereASceneNeedsThemAndOffWhereNot) {
   };
   const std::string ground = "[ground]\n", box = "[[obstacle]]\nshape = \"box\"\nsize_m = [0.2, 0.2]\n",
                     thrown = "velocity_m_s = [0.0, 2.0]\n", sunk = "velocity_m_s = [0.0, -2.0]\n",
-                    wind = "[air]\nvelocity_m_s = [20.0, 0.0]\n";
+                    wind = "[air]\nvelocity_m_s = [20.0, 0.0]\n", seam = "[[seam]]\nnormal = [0.0, 1.0]\n";
   const Case cases[] = {
       {kBody, "gravity", true},
       {kWeightless, "gravity", false},
@@ -77,6 +79,14 @@ TEST_F(SceneEffects, AreOnWhereASceneNeedsThemAndOffWhereNot) {
       {kBody, "damping", true},
       {kBody + "[material]\ndamping_time_s = 0.0\n", "damping", false},
       {kBody, "self_contact", false},
+      {kBody, "fracture", false},
+      {kBody + seam, "fracture", false},  // it falls freely
+      {kBody + seam + ground, "fracture", true},
+      {kBody + seam + "[[clamp]]\nnormal = [0.0, 1.0]\noffset_m = 0.1\n", "fracture", true},
+      {kWeightless + seam + "[[clamp]]\nnormal = [0.0, 1.0]\noffset_m = 0.1\n", "fracture", false},
+      {kWeightless + "spin_deg_s = 90.0\n" + seam, "fracture", true},
+      {kWeightless + "start = \"random\"\n" + seam, "fracture", true},
+      {kWeightless + seam + "[[activation]]\noffset = 0.1\n", "fracture", true},
   };
   for (const Case& one : cases) {
     SCOPED_TRACE(one.effect + " of\n" + one.text);
@@ -106,10 +116,40 @@ TEST_F(SceneEffects, ThatContradictEachOtherAreRefused) {
                                   kBody + "[effects]\npushes = \"on\"\n", kBody + "[water]\n[effects]\nair_drag = \"on\"\n",
                                   kBody + "[effects]\nself_contact = \"off\"\nself_friction = 0.3\n",
                                   kBody + "[material]\nlaw = \"stable_neo_hookean\"\n[effects]\nvolume = \"off\"\n",
-                                  kBody + "[effects]\nwatter = \"on\"\n"}) {
+                                  kBody + "[effects]\nfracture = \"on\"\n", kBody + "[effects]\nwatter = \"on\"\n"}) {
     SCOPED_TRACE(text);
     EXPECT_THROW(scenario(text), Error);
   }
+}
+
+TEST_F(SceneEffects, LetABodyTearWhereItIsMarked) {
+  const std::string bar =
+      "dimension = 2\n[body]\nshape = \"bar\"\nsize_m = [0.2, 0.6]\ncell_size_m = 0.1\nrotation_deg = 30.0\n[material]\n"
+      "youngs_modulus_pa = 2e5\n[[clamp]]\nnormal = [0.0, 1.0]\noffset_m = 0.29\n[[seam]]\nnormal = [0.0, 2.0]\noffset_m = 0.1\n";
+  const ScenarioOf<2> torn = scenario(bar + "strength_pa = 2000\n"), held = scenario(bar);
+  ASSERT_TRUE(torn.fracture && held.fracture);
+  EXPECT_EQ(torn.fracture->seams[0].strength, 2000);
+  EXPECT_EQ(held.fracture->seams[0].strength, 2e4);  // a tenth of Young's modulus
+  EXPECT_EQ(torn.fracture->faces.size(), 2U);
+  EXPECT_FALSE(torn.scene.self_contact.is_on);
+  EXPECT_TRUE(torn.fracture->self_contact.is_on);
+  retarget::SimulationOptions options;
+  options.duration_s = 0.5;
+  EXPECT_EQ(retarget::simulate(torn, options).report.pieces_end, 2);
+  EXPECT_EQ(retarget::simulate(held, options).report.pieces_end, 1);
+  const ScenarioOf<2> off = scenario(bar + "strength_pa = 2000\n[effects]\nfracture = \"off\"\n");
+  EXPECT_FALSE(off.fracture);
+  EXPECT_EQ(retarget::simulate(off, options).report.pieces_end, 1);
+  const auto rows = retarget::measure_effects(torn, options);
+  EXPECT_TRUE(std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.effect == "fracture"; }));
+  EXPECT_LT(retarget::estimated_error(torn, options), 0.05);
+}
+
+TEST_F(SceneEffects, LetNoPartTouchAnotherWhereThatIsTurnedOff) {
+  const std::string bar = kBody + "[[seam]]\nnormal = [1.0, 0.0]\n[effects]\nfracture = \"on\"\nself_contact = ";
+  EXPECT_FALSE(scenario(bar + "\"off\"\n").fracture->self_contact.is_on);
+  EXPECT_TRUE(scenario(bar + "\"auto\"\n").fracture->self_contact.is_on);
+  EXPECT_TRUE(scenario(bar + "\"on\"\n").fracture->self_contact.is_on);
 }
 
 /// The wave runs back, the body forth; in empty space its middle stays where it is.

@@ -373,6 +373,14 @@ TEST_F(SceneFiles, ThatAreWrongAreRefusedWithLineAndMend) {
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\ncalibrated = 1\n", "line 5", "'calibrated' of [material] is ", "Give true or false"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[material]\nlaw = \"neo_hookean\"\n", "line 5", "none of ", "Did you mean 'stable_neo_hookean'?"},
            {"[body]\nshape = \"cube\"\nsize_m = 1\n[[clamp]]\nnormal = [0, 0, 0]\n", "line 5", "has no direction", ""},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[seam]]\noffset_m = 0\n", "line 4", "'normal' of [[seam]] is missing", ""},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[seam]]\nnormal = [0, 0, 0]\n", "line 5", "has no direction", ""},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[seam]]\nnormal = [0, 1, 0]\noffset_m = 2\n", "line 5", "the seam parts nothing of the body", "between elements"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[seam]]\nnormal = [0, 1, 0]\nbox_m = [[5, 5, 5], [6, 6, 6]]\n", "line 6", "the seam parts nothing", "own frame"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[seam]]\nnormal = [0, 1, 0]\nbox_m = [[5, 5, 5]]\n", "line 6", "not two corners", "[low ...]"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[seam]]\nnormal = [0, 1, 0]\nstrength_pa = 0\n", "line 6", "'strength_pa' of [[seam]] is 0", "above 0"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[[seam]]\nnormal = [0, 1, 0]\nstrenght_pa = 5\n", "line 6", "not known here", "Did you mean 'strength_pa'?"},
+           {"[body]\nshape = \"cube\"\nsize_m = 1\n[effects]\nfracture = \"on\"\n", "line 4", "'fracture' is asked for, but no seam is marked", "Add what it needs"},
            {"method = \"magic\"\n[body]\nshape = \"cube\"\nsize_m = 1\n", "line 1", "'method' is 'magic'", ""},
        }) {
     SCOPED_TRACE(bad.text);

@@ -18,6 +18,9 @@ SceneOf<Dim> with_springs_alone(const SceneOf<Dim>& scene) {
 ///
 /// Linear and angular momentum change by the booked impulses alone, to rounding. Volumes and elements are left out, so that
 /// nothing but the springs' own stiffness resists a change of volume: a strongly loaded tet may turn inside out and stay so.
+/// Source: Provot, "Deformation constraints in a mass-spring model to describe rigid cloth behavior", Graphics Interface 1995, section 2,
+/// for springs alone; Van Gelder, "Approximate simulation of elastic membranes by triangulated spring meshes", Journal of Graphics Tools
+/// 3(2), 1998, for stiffness that goes with an element's measure over the square of the edge's length.
 template <int Dim>
 class SpringStepper final : public StepperOf<Dim> {
  public:

@@ -94,12 +94,18 @@ Eigen::MatrixXd closed_weights(const Eigen::MatrixXd& clip_weights, const Motion
 
 NodeTurns::NodeTurns(const ControlMesh& mesh, std::vector<int> nodes) : bind_pose_(mesh.nodes) {
   std::vector<std::vector<int>> around(static_cast<std::size_t>(mesh.nodes.cols()));
-  for (const auto edge : mesh.edges.colwise()) {
-    around[static_cast<std::size_t>(edge[0])].push_back(edge[1]);
-    around[static_cast<std::size_t>(edge[1])].push_back(edge[0]);
+  for (const auto tet : mesh.tets.colwise()) {
+    for (const int node : tet) {
+      for (const int other : tet) {
+        if (other != node) around[static_cast<std::size_t>(node)].push_back(other);
+      }
+    }
   }
   for (const int node : nodes) {
-    stars_.push_back(around[static_cast<std::size_t>(node)]);
+    std::vector<int>& star = around[static_cast<std::size_t>(node)];
+    std::sort(star.begin(), star.end());
+    star.erase(std::unique(star.begin(), star.end()), star.end());
+    stars_.push_back(star);
     stars_.back().push_back(node);
   }
 }

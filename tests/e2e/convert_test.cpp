@@ -200,7 +200,7 @@ TEST(Convert, RedoesOnlyWhatAChangedOptionReaches) {
   using Stages = std::set<std::string>;
   convert(directory.path, kSmallClip, "creature", options);
   const std::set<std::string> first = names_in(cache);
-  EXPECT_EQ(stages_kept(first, first), (Stages{"body", "coupling", "preparation", "inverse_dynamics", "replay"}));
+  EXPECT_EQ(stages_kept(first, first), (Stages{"body", "coupling", "preparation", "inverse_dynamics", "wobble", "replay"}));
   const std::string motion = motion_bytes(directory.path / "creature");
   const double solving = report_of(directory.path / "creature")["timing_s"]["inverse_dynamics"];
 
@@ -215,7 +215,7 @@ TEST(Convert, RedoesOnlyWhatAChangedOptionReaches) {
 
   convert(directory.path, kSmallClip, "creature", options + "--limit 0.15 --seed 3");
   const std::set<std::string> seeded = names_in(cache);
-  EXPECT_EQ(stages_kept(limited, seeded), (Stages{"body", "coupling", "preparation", "inverse_dynamics"}));
+  EXPECT_EQ(stages_kept(limited, seeded), (Stages{"body", "coupling", "preparation", "inverse_dynamics", "wobble"}));
 
   convert(directory.path, kSmallClip, "creature", options + "--limit 0.15 --friction 0.7");
   EXPECT_EQ(stages_kept(seeded, names_in(cache)), (Stages{"body", "coupling"}));

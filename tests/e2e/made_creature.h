@@ -30,7 +30,8 @@ inline nlohmann::json report_of(const std::filesystem::path& creature) {
 
 /// An effect as report.json tells it; empty where it does not.
 inline nlohmann::json effect_of(const std::filesystem::path& creature, const std::string& name) {
-  for (const nlohmann::json& effect : report_of(creature).at("effects")) {
+  const nlohmann::json report = report_of(creature);
+  for (const nlohmann::json& effect : report.at("effects")) {
     if (effect.at("name") == name) return effect;
   }
   return {};

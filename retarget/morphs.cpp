@@ -94,10 +94,15 @@ Eigen::MatrixXd closed_weights(const Eigen::MatrixXd& clip_weights, const Motion
 
 NodeTurns::NodeTurns(const ControlMesh& mesh, std::vector<int> nodes) : bind_pose_(mesh.nodes) {
   std::vector<std::vector<int>> around(static_cast<std::size_t>(mesh.nodes.cols()));
+  const auto join = [&](int a, int b) { around[static_cast<std::size_t>(a)].push_back(b); };
+  for (int e = 0; mesh.tets.cols() == 0 && e < mesh.edges.cols(); ++e) {
+    join(mesh.edges(0, e), mesh.edges(1, e));
+    join(mesh.edges(1, e), mesh.edges(0, e));
+  }
   for (const auto tet : mesh.tets.colwise()) {
     for (const int node : tet) {
       for (const int other : tet) {
-        if (other != node) around[static_cast<std::size_t>(node)].push_back(other);
+        if (other != node) join(node, other);
       }
     }
   }

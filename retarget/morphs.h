@@ -39,8 +39,8 @@ Eigen::MatrixXd closed_weights(const Eigen::MatrixXd& clip_weights, const Motion
 class NodeTurns {
  public:
   NodeTurns(const ControlMesh& mesh, std::vector<int> nodes);
-  /// The rotations that take each node and its neighbours along edges of tets closest from the bind pose to `positions` [m], 3 x N;
-  /// `otherwise` where there are fewer than three neighbours.
+  /// The rotations that take each node and its neighbours along edges of tets (the mesh's own edges where it has no tets) closest
+  /// from the bind pose to `positions` [m], 3 x N; `otherwise` where there are fewer than three neighbours.
   std::vector<Eigen::Quaterniond> at(const Eigen::Ref<const Eigen::Matrix3Xd>& positions,
                                      const Eigen::Quaterniond& otherwise) const;
 

@@ -15,8 +15,12 @@ namespace {
 // Three points of the curve: what an eye forgives, what it does not see, what a measurement wants [per L].
 const std::map<std::string, double> kGrades{{"draft", 0.05}, {"standard", 0.01}, {"final", 0.001}};
 
-constexpr double kOverFloor = 3;                        // of the reference's own error [-]: what a grade asks for at least
+constexpr double kOverFloor = 1.5;                      // of the reference's own error [-]: what a grade asks for at least
 constexpr double kFinestSeconds = kControlSeconds / 8;  // of the closed loop that choices are held against
+// A creature's draft is there soon: an error from here on is told without a second integrator, against a closed loop in longer
+// steps, with all harmonics.
+constexpr double kRough = 0.03;
+constexpr double kRoughFinestSeconds = kControlSeconds / 2;
 
 /// Share of the work of the most accurate row that a choice saves; 0 where nothing was chosen.
 double work_saved(const std::vector<retarget::AccuracyRow>& rows, int choice) {
@@ -115,10 +119,11 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
                        const retarget::SignalSet& signals, std::optional<physics::Method> only) {
   retarget::AccuracyOptions options;
   options.step_frame_s = kControlSeconds;
-  const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options);
+  const bool is_rough = asked.most(command) >= kRough;
+  const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options, !is_rough);
   ChosenStep chosen = choose_step(asked, command, reference, only);
   if (!chosen.report.is_met()) return chosen;
-  const retarget::StepSetting finest{only.value_or(reference.setting.method), kFinestSeconds};
+  const retarget::StepSetting finest{only.value_or(reference.setting.method), is_rough ? kRoughFinestSeconds : kFinestSeconds};
   chosen.finest = closed_loop(performer, signals, finest);
   std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
   rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
@@ -158,7 +163,7 @@ void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, ret
   constexpr int kLeast = 4;
   const int all = signals.activation.harmonics();
   for (retarget::AccuracyRow& row : chosen.curve.rows) row.harmonics = all;
-  if (!chosen.report.is_met() || !chosen.finest) return;
+  if (!chosen.report.is_met() || !chosen.finest || chosen.report.max_error_length >= kRough) return;
   const double room = (chosen.report.max_error_length - chosen.curve.floor) * performer.length;
   int kept = all;
   for (const double part : {0.75, 0.5, 0.25}) {

@@ -210,8 +210,7 @@ class Bench {
       brief.replay = replay;
       brief.replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);
       brief.replay.duration_s = std::min(kBriefly, retarget::usual_duration(solved.prepared.target));
-      double effort = 1;
-      const retarget::Performances runs = retarget::perform_calmly(level.performer, level.signals, brief, effort);
+      const retarget::Performances runs = retarget::perform_calmly(level.performer, level.signals, brief);
       row.falls = runs.main().report.fell || runs.main().termination != physics::Termination::kDone;
       row.stable = row.stable && !row.falls;
       curve_.rows.push_back(row);

@@ -16,6 +16,7 @@
 #include "io/gltf_out.h"
 #include "io/load_creature.h"
 #include "io/trace_writer.h"
+#include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
 
 namespace hydrostat::cli {
@@ -202,14 +203,7 @@ int replay(const ReplayCommand& command) {
   const auto perform = [&] {
     return stages.run("replay", [&] {
       if (!command.level.is_asked()) return retarget::perform(performer, creature.signals, options);
-      double effort = 1;
-      retarget::Performances runs = retarget::perform_calmly(performer, creature.signals, options, effort);
-      options.replay.corrector.effort *= effort;
-      if (effort > 1) {
-        creature.target.report.warnings.push_back("level: it keeps up only on feedback whose effort is " +
-                                                  std::to_string(std::lround(effort)) + " times as dear as usual");
-      }
-      return runs;
+      return retarget::perform_calmly(performer, creature.signals, options);
     });
   };
   retarget::Performances performances = perform();
@@ -222,7 +216,10 @@ int replay(const ReplayCommand& command) {
     take_steps(options.replay, chosen->setting);
     performances = perform();
   }
-  if (command.level.is_asked()) warn_of_lost_way(performances.main(), creature.target.report.warnings);
+  options.replay.corrector.effort *= performances.effort;
+  std::vector<std::string>& warnings = creature.target.report.warnings;
+  for (const std::string& warning : retarget::feedback_warnings(performances)) warnings.push_back(warning);
+  if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
   if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
   const bool is_met = !chosen || chosen->report.is_met();
   if (!command.json) tell_level(creature.target.report.level, command.directory);

@@ -225,7 +225,8 @@ void name_fields(RecordArchive& archive, retarget::Replay& replay) {
 }
 
 void name_fields(RecordArchive& archive, retarget::Performances& performances) {
-  archive.fields("naive", performances.naive, "open_loop", performances.open_loop, "closed_loop", performances.closed_loop);
+  archive.fields("naive", performances.naive, "open_loop", performances.open_loop, "closed_loop", performances.closed_loop,
+                 "effort", performances.effort);
 }
 
 void name_fields(RecordArchive& archive, retarget::SourceReport& report) {

@@ -92,9 +92,7 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
   return result;
 }
 
-Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options,
-                            double& effort) {
-  effort = 1;
+Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
   Performances result = perform(performer, signals, options);
   PerformOptions calmer = options;
   calmer.baselines = false;
@@ -107,7 +105,7 @@ Performances perform_calmly(const Performer& performer, const SignalSet& signals
     Performances next = perform(performer, signals, calmer);
     if (!is_up(next)) continue;
     result.closed_loop = std::move(next.closed_loop);
-    effort = factor;
+    result.effort = factor;
   }
   return result;
 }

@@ -42,6 +42,7 @@ struct PerformOptions {
 /// were not wanted are empty; the closed or the open loop is there.
 struct Performances {
   std::optional<Replay> naive, open_loop, closed_loop;
+  double effort = 1;  // of the closed loop's feedback, over what was wished
 
   /// The closed loop where there is one, else the open loop.
   const Replay& main() const { return closed_loop ? *closed_loop : *open_loop; }
@@ -63,10 +64,8 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// The same, on calmer feedback where the closed loop falls: effort is 4, 16, then 64 times as dear, and the first with which
-/// it stays up counts, or the usual one where none does. On coarse bodies a gain that others need shakes the feet loose. Says in
-/// `effort` by what factor.
-Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options,
-                            double& effort);
+/// it stays up counts, or the usual one where none does. On coarse bodies a gain that others need shakes the feet loose.
+Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's
 /// substep is halved.

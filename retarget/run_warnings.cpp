@@ -83,4 +83,10 @@ std::vector<std::string> inverse_warnings(const InverseReport& inverse) {
   return warnings;
 }
 
+std::vector<std::string> feedback_warnings(const Performances& performances) {
+  if (performances.effort == 1) return {};
+  return {"feedback: it keeps up only where effort is " + std::to_string(std::lround(performances.effort)) +
+          " times as dear as usual"};
+}
+
 }  // namespace hydrostat::retarget

@@ -15,4 +15,7 @@ std::vector<std::string> target_warnings(const PreparedTarget& prepared, const p
 /// The same about what the inverse dynamics found.
 std::vector<std::string> inverse_warnings(const InverseReport& inverse);
 
+/// That a creature stays up on calmer feedback alone (perform_calmly); none where the usual one will do.
+std::vector<std::string> feedback_warnings(const Performances& performances);
+
 }  // namespace hydrostat::retarget

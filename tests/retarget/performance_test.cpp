@@ -56,6 +56,25 @@ TEST(Perform, RunsOnlyWhatIsWanted) {
   EXPECT_EQ(open.main().report.correction_rms, 0);
 }
 
+/// Feedback that is too eager for what it knows, late and roughly, shakes the body down: the search ends at the first effort that does not.
+TEST(PerformCalmly, TakesTheFirstEffortThatStaysUp) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  PerformOptions options = lasting(1.5);
+  EXPECT_EQ(perform_calmly(performer, signals, options).effort, 1);
+  const auto falls = [](const Performances& runs) { return runs.main().report.fell; };
+  options.replay.observation = {0.1 * performer.length, 0.1};
+  ASSERT_TRUE(falls(perform(performer, signals, options)));
+  const Performances calm = perform_calmly(performer, signals, options);
+  EXPECT_FALSE(falls(calm));
+  EXPECT_GT(calm.effort, 1);
+  EXPECT_TRUE(calm.naive && calm.open_loop);
+  options.replay.corrector.effort *= calm.effort / 4;
+  EXPECT_TRUE(falls(perform(performer, signals, options)));
+  options.replay.corrector.effort *= 4;
+  EXPECT_TRUE(calm.main().motion.frames == perform(performer, signals, options).main().motion.frames);
+}
+
 TEST(VariationOf, IsNothingForSeed0AndWithinTwoPerCentForOthers) {
   EXPECT_EQ(variation_of(0).mass, 1);
   EXPECT_EQ(variation_of(0).friction, 1);

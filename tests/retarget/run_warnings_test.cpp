@@ -43,5 +43,12 @@ TEST(InverseWarnings, ComeOnePerFigureThatIsTooLarge) {
   EXPECT_EQ(inverse_warnings(report).size(), 3U);
 }
 
+TEST(FeedbackWarnings, TellOfCalmerFeedbackAlone) {
+  Performances performances;
+  EXPECT_TRUE(feedback_warnings(performances).empty());
+  performances.effort = 16;
+  EXPECT_EQ(feedback_warnings(performances), std::vector<std::string>{"feedback: it keeps up only where effort is 16 times as dear as usual"});
+}
+
 }  // namespace
 }  // namespace hydrostat::retarget

@@ -1,0 +1,275 @@
+#include "cli/conversion.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "cli/make_performer.h"
+#include "cli/outcome.h"
+#include "cli/wobble_option.h"
+#include "io/body_file.h"
+#include "io/creature_record.h"
+#include "io/fingerprint.h"
+#include "io/gltf_out.h"
+#include "io/signals_file.h"
+#include "io/stage_records.h"
+#include "io/wobble_file.h"
+#include "retarget/com_path.h"
+#include "retarget/error.h"
+#include "retarget/flight.h"
+#include "retarget/run_warnings.h"
+#include "retarget/wobble_plan.h"
+
+namespace hydrostat::cli {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// The key of a stage: all that the stage before depends on, and what this one adds.
+template <typename... Values>
+std::string key_after(const std::string& before, const Values&... values) {
+  io::Fingerprint fingerprint;
+  fingerprint.add("before", before);
+  (fingerprint.add("value", values), ...);
+  return fingerprint.hex();
+}
+
+/// What the body depends on: this program and what was read, wherever its bytes lie (a glTF file may have them beside it).
+std::string key_of(const io::ImportedCharacter& imported) {
+  return key_after(io::file_sha256("/proc/self/exe"), io::packed(io::record_of(imported), "import", ""));
+}
+
+/// Layers of the creature that is about to be replaced; a sentence for each that does not fit any more.
+std::vector<std::string> keep_earlier_layers(const fs::path& creature, retarget::SignalSet& signals) {
+  const fs::path file = creature / "signals.json";
+  if (!io::is_creature(creature) || !fs::exists(file)) return {};
+  return retarget::keep_layers(io::read_signals(file), signals);
+}
+
+retarget::SourceReport source_report(const ConvertOptions& options, const retarget::Creature& creature,
+                                     const retarget::ImportedMotion& motion) {
+  const retarget::Clip& clip = creature.character.clip;
+  retarget::SourceReport report;
+  report.file = options.clip_file;
+  report.sha256 = io::file_sha256(options.clip_file);
+  report.clip = clip.name;
+  report.root_motion = motion.root_motion;
+  report.duration_s = clip.duration_s;
+  report.rate_hz = clip.key_rate_hz;
+  report.scale = creature.scale;
+  return report;
+}
+
+retarget::BodyReport body_report(const retarget::Creature& creature) {
+  retarget::BodyReport report;
+  report.nodes = creature.mesh.node_count();
+  const physics::Body& body = creature.scene.body;
+  report.elements = body.elements.empty() ? body.tet_count() : body.elements.front().block.element_count();
+  report.constraints = body.edge_count();
+  report.vertices = static_cast<int>(creature.character.skin.vertices.cols());
+  report.pieces = retarget::count_pieces(creature.mesh.tets);
+  report.bridged_cells = creature.mesh.bridged_cells;
+  report.copied_cells = creature.mesh.copied_cells;
+  report.mass_kg = creature.scene.body.mass.sum();
+  report.length_m = creature.length;
+  report.size_m = creature.size;
+  report.youngs_modulus_pa =
+      body.elements.empty() ? creature.youngs_modulus : body.elements.front().materials.front().youngs_modulus;
+  return report;
+}
+
+io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
+                                   const std::optional<ChosenStep>& chosen, double effort) {
+  io::CreatureRecord record;
+  record.source_file = fs::absolute(options.clip_file).string();
+  record.source_sha256 = report.source.sha256;
+  record.clip = report.source.clip;
+  record.clip_rise_m = performer.clip_rise;
+  record.settings = {{"height", options.height},
+                     {"nodes", std::int64_t{options.nodes}},
+                     {"root-motion", options.root_motion},
+                     {"limit", report.inverse.limit},
+                     {"limit-chosen-by", options.limit == "auto" ? std::string("auto") : std::string("user")},
+                     {"element", report.accuracy.element},
+                     {"material", report.accuracy.material},
+                     {"calibrated", options.calibrated},
+                     {"method", report.accuracy.method},
+                     {"friction", options.friction},
+                     {"wobble", options.wobble},
+                     {"seed", std::int64_t{options.seed}}};
+  for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
+  if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
+  if (!options.import.up.empty()) record.settings.emplace_back("up", options.import.up);
+  if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
+  if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
+  if (effort != 1) record.settings.emplace_back("corrector_effort", effort);
+  for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
+  return record;
+}
+
+Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
+  Eigen::VectorXi bones(bone_weights.cols());
+  for (Eigen::Index i = 0; i < bones.size(); ++i) bone_weights.col(i).maxCoeff(&bones[i]);
+  return bones;
+}
+
+}  // namespace
+
+void Conversion::run(const io::ImportedCharacter& imported, double wished_limit) {
+  add_warnings(imported.warnings);
+  appearance_ = imported.appearance;
+  make_body(imported);
+  find_activations(wished_limit);
+  solve_signals();
+  if (options_.accuracy.is_asked()) choose_steps();
+  let_go();
+  write();
+}
+
+void Conversion::add_warnings(const std::vector<std::string>& more) {
+  std::vector<std::string>& warnings = target_.report.warnings;
+  warnings.insert(warnings.end(), more.begin(), more.end());
+}
+
+void Conversion::make_body(const io::ImportedCharacter& imported) {
+  key_ = key_after(key_of(imported), options_.height, settings_.nodes, options_.element, name_of(settings_.material),
+                   std::int64_t{settings_.calibrated});
+  creature_ = stages_.run("body", key_, [&] { return retarget::make_creature(imported.character, settings_); });
+  creature_.scene.ground.friction = options_.friction;  // of the ground, not of the body: what is cached may have another
+  key_ = key_after(key_, options_.root_motion);
+  motion_ = stages_.run("coupling", key_, [&] { return retarget::import_motion(creature_, settings_); });
+  add_warnings(creature_.warnings);
+  add_warnings(motion_.warnings);
+}
+
+void Conversion::find_activations(double wished_limit) {
+  const physics::Scene& scene = creature_.scene;
+  key_ = key_after(key_, options_.friction);
+  retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_); });
+  retarget::InverseOptions inverse_options;
+  inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);
+  inverse_options.threads = options_.threads;
+  key_ = key_after(key_, inverse_options.limit);
+  inverse_ = stages_.run("inverse_dynamics", key_, [&] {
+    return retarget::solve_inverse_dynamics(prepared, scene, creature_.length, inverse_options);
+  });
+  add_warnings(prepared.warnings);
+  warn_of_flights(prepared);
+  add_warnings(retarget::target_warnings(prepared, scene.body, inverse_options.limit, wished_limit == 0));
+  add_warnings(retarget::inverse_warnings(inverse_.report));
+  target_.performer = make_performer(creature_, motion_, std::move(prepared));
+  plan_wobble();
+}
+
+void Conversion::plan_wobble() {
+  retarget::Performer& performer = target_.performer;
+  const retarget::Wish wish = wobble_wish(options_.wobble);
+  const auto plan = [&] { return retarget::plan_wobble(performer, rig(), wish); };
+  performer.wobble = wish == retarget::Wish::kOff ? plan() : stages_.run("wobble", key_after(key_, options_.wobble), plan);
+}
+
+retarget::Rig Conversion::rig() const {
+  return {creature_.character.skeleton, creature_.character.skin, creature_.mesh.bone_weights};
+}
+
+void Conversion::warn_of_flights(const retarget::PreparedTarget& prepared) {
+  const Eigen::Matrix3Xd path = retarget::com_path(motion_.nodes, creature_.scene.body.mass);
+  const auto& vertices = creature_.character.skin.vertices;
+  add_warnings(retarget::flight_warnings(
+      retarget::flights(prepared.contacts, motion_.nodes, path, creature_.scene.gravity.norm()), motion_.nodes.rate_hz,
+      vertices.row(1).maxCoeff() - vertices.row(1).minCoeff(), creature_.length));
+}
+
+void Conversion::solve_signals() {
+  signals_ = stages_.run("signals", [&] {
+    return solved_signals(inverse_, target_.performer, options_.clip_file, creature_.character.clip.name);
+  });
+  retarget::RunReport& report = target_.report;
+  report.source = source_report(options_, creature_, motion_);
+  report.body = body_report(creature_);
+  report.coupling = motion_.coupling;
+  report.preparation = target_.performer.prepared.report;
+  report.inverse = inverse_.report;
+  report.signals = signals_report(signals_);
+  report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
+  target_file_ = io::target_bytes(target_);  // before what a replay will tell anew
+  add_warnings(keep_earlier_layers(options_.out, signals_));
+  signals_text_ = io::signals_text(signals_);
+}
+
+void Conversion::choose_steps() {
+  stages_.run("accuracy", [&] {
+    const std::optional<physics::Method> only = options_.method == "auto" ? std::nullopt : std::optional(settings_.method);
+    chosen_ = choose_step(options_.accuracy, "hydrostat convert", target_.performer, signals_, only);
+    whole_signals_ = signals_;
+    cut_harmonics(*chosen_, target_.performer, signals_);
+    return 0;
+  });
+  tell_signals();
+}
+
+void Conversion::tell_signals() {
+  target_.report.signals = signals_report(signals_);
+  target_.report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
+  signals_text_ = io::signals_text(signals_);
+  target_file_ = io::target_bytes(target_);
+}
+
+void Conversion::let_go() {
+  perform();
+  while (chosen_ && is_down(performances_.main()) &&
+         take_next(*chosen_, target_.performer, whole_signals_, target_.report.warnings)) {
+    signals_ = whole_signals_;
+    tell_signals();
+    perform();
+  }
+  add_warnings(retarget::feedback_warnings(performances_));
+  if (chosen_) target_.report.accuracy = told(*chosen_);
+  report_replays(performances_, target_.report);
+  stages_.run("measurement", [&] {
+    measure(target_.performer, signals_, perform_options(), target_.report);
+    return 0;
+  });
+}
+
+retarget::PerformOptions Conversion::perform_options() const {
+  retarget::PerformOptions result;
+  result.replay.method = settings_.method;
+  if (chosen_) take_steps(result.replay, chosen_->setting);
+  result.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
+  result.replay.corrector.effort *= performances_.effort;
+  result.seed = options_.seed;
+  result.threads = options_.threads;
+  return result;
+}
+
+void Conversion::perform() {
+  const retarget::PerformOptions options = perform_options();
+  key_ = key_after(key_, signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
+  if (chosen_) key_ = key_after(key_, options.replay.step_s);
+  performances_ = stages_.run("replay", key_, [&] { return retarget::perform_calmly(target_.performer, signals_, options); });
+}
+
+void Conversion::write() {
+  const retarget::Performer& performer = target_.performer;
+  stages_.run("files", [&] {
+    writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.effort)));
+    writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
+                                             dominant_bones_of_nodes(creature_.mesh.bone_weights)));
+    writer_.write("target.bin", target_file_);
+    if (!performer.morphs.targets.empty()) writer_.write("morphs.bin", io::morphs_bytes(performer.morphs));
+    if (!appearance_.parts.empty()) writer_.write("appearance.bin", io::appearance_bytes(appearance_));
+    if (performer.wobble.is_on()) writer_.write("wobble.bin", io::wobble_bytes(performer.wobble));
+    writer_.write("rig.bin", io::rig_bytes(rig()));
+    writer_.write("signals.json", signals_text_);
+    io::write_skinned_glb(writer_.directory() / "reference.glb",
+                          {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance_,
+                           &performer.morphs},
+                          performer.mesh, performer.scene.body.mass, performer.prepared.target, {});
+    return 0;
+  });
+  target_.report.timing_s = stages_.timing_s;
+  write_outcome(writer_, performer, appearance_, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
+}
+
+}  // namespace hydrostat::cli

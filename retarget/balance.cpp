@@ -304,20 +304,9 @@ Eigen::MatrixXd missing_wrench(const Motion& target, const physics::Scene& scene
   Eigen::MatrixXd missing(6, target.count());
   for (long f = 0; f < target.count(); ++f) {
     const FrameBalance& frame = balances[static_cast<std::size_t>(f)];
-    const int forces = static_cast<int>(frame.give.cols());
-    BoundedLeastSquares problem;
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6 + forces, forces);
-    rows.topRows<6>() = kBalanceWeight * frame.give;
-    rows.bottomRows(forces).diagonal().setConstant(kForceAloneWeight);
-    problem.jacobian = rows.sparseView();
-    problem.target = Eigen::VectorXd::Zero(6 + forces);
-    problem.target.head<6>() = kBalanceWeight * frame.want;
-    problem.lower = Eigen::VectorXd::Zero(forces);
-    problem.upper = Eigen::VectorXd::Constant(forces, std::numeric_limits<double>::infinity());
-    problem.row_blocks = {0, 6};
-    for (int k = 0; k < forces; ++k) problem.row_blocks.push_back(7 + k);
-    for (int k = 0; k <= forces; ++k) problem.column_blocks.push_back(k);
-    const Eigen::VectorXd given = solve(problem, Eigen::VectorXd::Constant(forces, 1e-3)).x;
+    const BoundedLeastSquares problem =
+        held_nonnegative(kBalanceWeight * frame.give, kBalanceWeight * frame.want, kForceAloneWeight);
+    const Eigen::VectorXd given = solve(problem, Eigen::VectorXd::Constant(frame.give.cols(), 1e-3)).x;
     missing.col(f) = frame.want - frame.give * given;
   }
   return missing;

@@ -1,7 +1,6 @@
 #include "retarget/bear_loads.h"
 
 #include <cmath>
-#include <limits>
 
 #include "physics/internal_forces.h"
 #include "physics/system_matrix.h"
@@ -36,23 +35,13 @@ Eigen::Matrix3Xd ground_forces(const physics::Scene& scene, const ContactSchedul
     wanted.head<3>() += force / weight;
     wanted.tail<3>() += (state.x.col(i) - com).cross(force) / (weight * length);
   }
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6 + count, count);
+  Eigen::MatrixXd given_by(6, count);
   for (int k = 0; k < count; ++k) {
     const ContactGenerator& generator = generators[static_cast<std::size_t>(k)];
-    rows.col(k).head<3>() = kGroundBalance * generator.force;
-    rows.col(k).segment<3>(3) =
-        kGroundBalance * (scene.contact_points.of(state.x, generator.point) - com).cross(generator.force) / length;
+    given_by.col(k).head<3>() = generator.force;
+    given_by.col(k).tail<3>() = (scene.contact_points.of(state.x, generator.point) - com).cross(generator.force) / length;
   }
-  rows.bottomRows(count).diagonal().setOnes();
-  BoundedLeastSquares problem;
-  problem.jacobian = rows.sparseView();
-  problem.target = Eigen::VectorXd::Zero(6 + count);
-  problem.target.head<6>() = kGroundBalance * wanted;
-  problem.lower = Eigen::VectorXd::Zero(count);
-  problem.upper = Eigen::VectorXd::Constant(count, std::numeric_limits<double>::infinity());
-  problem.row_blocks = {0, 6};
-  for (int k = 0; k < count; ++k) problem.row_blocks.push_back(7 + k);
-  for (int k = 0; k <= count; ++k) problem.column_blocks.push_back(k);
+  const BoundedLeastSquares problem = held_nonnegative(kGroundBalance * given_by, kGroundBalance * wanted, 1);
   const Eigen::VectorXd given = solve(problem, Eigen::VectorXd::Constant(count, 1e-3)).x;
   for (int k = 0; k < count; ++k) {
     const ContactGenerator& generator = generators[static_cast<std::size_t>(k)];
@@ -64,6 +53,39 @@ Eigen::Matrix3Xd ground_forces(const physics::Scene& scene, const ContactSchedul
   return nodes;
 }
 
+/// The change of activations that takes most of the forces [N] that are left: conjugate gradients on the normal equations of the
+/// nodes' misses, `rows` a metre through the factored system matrix, and of the effort. `b`: force per activation.
+Eigen::VectorXd change_for(const Eigen::VectorXd& left, const Eigen::VectorXd& rows, physics::SystemMatrix& matrix,
+                           const Eigen::SparseMatrix<double>& b) {
+  const double effort = kEffort / static_cast<double>(b.cols());
+  Eigen::MatrixXd column(rows.size(), 1);
+  const auto miss_of = [&](const Eigen::VectorXd& force) -> Eigen::VectorXd {
+    column = force;
+    matrix.solve_in_place(column);
+    return rows.cwiseProduct(column.col(0));
+  };
+  const auto back = [&](const Eigen::VectorXd& miss) -> Eigen::VectorXd {
+    column = rows.cwiseProduct(miss);
+    matrix.solve_in_place(column);
+    return b.transpose() * column.col(0);
+  };
+  Eigen::VectorXd miss = -miss_of(left), change = Eigen::VectorXd::Zero(b.cols());
+  Eigen::VectorXd slope = back(miss), way = slope;
+  double steepness = slope.squaredNorm();
+  const double enough = kLeastSlope * kLeastSlope * steepness;
+  for (int round = 0; round < kRounds && steepness > enough; ++round) {
+    const Eigen::VectorXd moved = miss_of(b * way);
+    const double step = steepness / (moved.squaredNorm() + effort * way.squaredNorm());
+    change += step * way;
+    miss -= step * moved;
+    slope = back(miss) - effort * change;
+    const double before = steepness;
+    steepness = slope.squaredNorm();
+    way = slope + steepness / before * way;
+  }
+  return change;
+}
+
 }  // namespace
 
 void bear_loads(const Performer& performer, Eigen::MatrixXd& activation) {
@@ -73,11 +95,10 @@ void bear_loads(const Performer& performer, Eigen::MatrixXd& activation) {
   const Eigen::MatrixXd speeds = velocities(target), pulls = accelerations(target);
   physics::InternalForces<3> forces(body);
   physics::SystemMatrix matrix(body);
-  const double square = kHorizon * kHorizon, effort = kEffort / body.edge_count();
+  const double square = kHorizon * kHorizon;
   Eigen::VectorXd rows(3 * body.node_count());  // W T^2
   for (int i = 0; i < body.node_count(); ++i)
     rows.segment<3>(3 * i).setConstant(square * std::sqrt(body.mass[i] / body.mass.sum()) / (kMissUnit * performer.length));
-  Eigen::MatrixXd column(rows.size(), 1);
   for (Eigen::Index f = 0; f < target.count(); ++f) {
     const physics::State state{target.at(f), speeds.col(f).reshaped(3, body.node_count()), {}};
     const Eigen::Matrix3Xd acceleration = pulls.col(f).reshaped(3, body.node_count());
@@ -90,32 +111,7 @@ void bear_loads(const Performer& performer, Eigen::MatrixXd& activation) {
     matrix.add_damping(body, state.x, kHorizon);
     forces.add_stiffness(state.x, square, matrix);
     if (!matrix.factor()) continue;
-    const Eigen::SparseMatrix<double> b = forces.force_per_activation(state.x);
-    const auto miss_of = [&](const Eigen::VectorXd& force) -> Eigen::VectorXd {
-      column = force;
-      matrix.solve_in_place(column);
-      return rows.cwiseProduct(column.col(0));
-    };
-    const auto back = [&](const Eigen::VectorXd& miss) -> Eigen::VectorXd {
-      column = rows.cwiseProduct(miss);
-      matrix.solve_in_place(column);
-      return b.transpose() * column.col(0);
-    };
-    Eigen::VectorXd miss = -miss_of(left.reshaped()), change = Eigen::VectorXd::Zero(body.edge_count());
-    Eigen::VectorXd slope = back(miss), way = slope;
-    double steepness = slope.squaredNorm();
-    const double enough = kLeastSlope * kLeastSlope * steepness;
-    for (int round = 0; round < kRounds && steepness > enough; ++round) {
-      const Eigen::VectorXd moved = miss_of(b * way);
-      const double step = steepness / (moved.squaredNorm() + effort * way.squaredNorm());
-      change += step * way;
-      miss -= step * moved;
-      slope = back(miss) - effort * change;
-      const double before = steepness;
-      steepness = slope.squaredNorm();
-      way = slope + steepness / before * way;
-    }
-    activation.col(f) += change;
+    activation.col(f) += change_for(left.reshaped(), rows, matrix, forces.force_per_activation(state.x));
   }
 }
 

@@ -303,6 +303,25 @@ void BoundedSolver::measure_kkt_residual() {
 
 }  // namespace
 
+BoundedLeastSquares held_nonnegative(const Eigen::MatrixXd& rows, const Eigen::VectorXd& target, double hold) {
+  const Eigen::Index tied = rows.rows(), count = rows.cols();
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(tied + count, count);
+  all.topRows(tied) = rows;
+  all.bottomRows(count).diagonal().setConstant(hold);
+  BoundedLeastSquares problem;
+  problem.jacobian = all.sparseView();
+  problem.target = Eigen::VectorXd::Zero(tied + count);
+  problem.target.head(tied) = target;
+  problem.lower = Eigen::VectorXd::Zero(count);
+  problem.upper = Eigen::VectorXd::Constant(count, std::numeric_limits<double>::infinity());
+  problem.row_blocks.push_back(0);
+  for (Eigen::Index k = 0; k <= count; ++k) {
+    problem.row_blocks.push_back(static_cast<int>(tied + k));
+    problem.column_blocks.push_back(static_cast<int>(k));
+  }
+  return problem;
+}
+
 BoundedSolution solve(const BoundedLeastSquares& problem, const Eigen::VectorXd& start, int max_pivots) {
   return BoundedSolver(problem, start).solve(max_pivots);
 }

@@ -17,6 +17,9 @@ struct BoundedLeastSquares {
   int coupled_rows = 0;
 };
 
+/// minimise 1/2 |rows x - target|^2 + 1/2 hold^2 |x|^2 subject to x >= 0, of a few rows that tie all unknowns together.
+BoundedLeastSquares held_nonnegative(const Eigen::MatrixXd& rows, const Eigen::VectorXd& target, double hold);
+
 struct BoundedSolution {
   Eigen::VectorXd x;
   double kkt_residual = 0;  // max violation of the optimality conditions [1]: gradient over the column's length times the target's, bounds exact

@@ -27,7 +27,8 @@ Vibration lowest_modes(const Eigen::SparseMatrix<double>& stiffness, const Eigen
   if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() <= 0) return result;
   Eigen::MatrixXd vectors = random_vectors(size, width);
   Eigen::VectorXd before = Eigen::VectorXd::Zero(kept);
-  for (int round = 0; round < kMostRounds; ++round) {
+  Eigen::Index settled = 0;  // modes, the lowest first
+  for (int round = 0; round < kMostRounds && settled < kept; ++round) {
     const Eigen::MatrixXd weighed = mass.asDiagonal() * vectors, solved = solver.solve(weighed);
     // Within the solved vectors: their stiffness is theirs with what was solved for.
     const Eigen::MatrixXd small_stiffness = solved.transpose() * weighed;
@@ -35,11 +36,12 @@ Vibration lowest_modes(const Eigen::SparseMatrix<double>& stiffness, const Eigen
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> small(small_stiffness, small_mass);
     vectors = solved * small.eigenvectors();
     result.squared_frequency = small.eigenvalues().head(kept);
-    const double change = ((result.squared_frequency - before).array() / result.squared_frequency.array()).abs().maxCoeff();
-    if (change < kSettled) break;
-    before = result.squared_frequency;
+    const Eigen::VectorXd& now = result.squared_frequency;
+    for (settled = 0; settled < kept && std::abs(now[settled] - before[settled]) < kSettled * now[settled];) ++settled;
+    before = now;
   }
-  result.shapes = vectors.leftCols(kept);
+  result.squared_frequency.conservativeResize(settled);
+  result.shapes = vectors.leftCols(settled);
   for (auto shape : result.shapes.colwise()) {
     Eigen::Index largest = 0;
     shape.cwiseAbs().maxCoeff(&largest);

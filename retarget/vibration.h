@@ -11,8 +11,8 @@ struct Vibration {
 };
 
 /// The `count` lowest modes (fewer where there are fewer unknowns) of a symmetric positive definite stiffness, n x n [N/m],
-/// and lumped masses, n, > 0 [kg]. The lowest frequencies are exact to 1e-6. Deterministic. Without modes where the
-/// stiffness is not positive definite.
+/// and lumped masses, n, > 0 [kg]. Squared frequencies are exact to 1e-6; modes that have not settled to it after 60 rounds are left
+/// out. Deterministic. Without modes where the stiffness is not positive definite.
 /// Source: Bathe and Wilson, "Solution methods for eigenvalue problems in structural mechanics", IJNME 6, 1973 (iteration of
 /// a subspace).
 Vibration lowest_modes(const Eigen::SparseMatrix<double>& stiffness, const Eigen::VectorXd& mass, Eigen::Index count);

@@ -72,7 +72,7 @@ std::string one_line(const Error& error) {
   line += error.what();
   if (!line.ends_with('.')) line += '.';
   if (!error.mend.empty()) line += ' ' + error.mend;
-  if (!line.ends_with('.')) line += '.';
+  if (!line.ends_with('.') && !line.ends_with('?')) line += '.';
   for (char& letter : line) {
     if (letter == '\n' || letter == '\r') letter = ' ';
   }

@@ -18,6 +18,7 @@
 #include "io/simulation_files.h"
 #include "io/trace_writer.h"
 #include "retarget/accuracy.h"
+#include "retarget/step_warning.h"
 
 namespace hydrostat::cli {
 
@@ -97,6 +98,14 @@ ChosenStep choose(const SimulateCommand& command, io::SceneFile& scene) {
         return chosen;
       },
       scene.scenario);
+}
+
+/// What of the way it is stepped should be known.
+void warn_of_steps(io::SceneFile& scene) {
+  if (scene.method != physics::Method::kExplicit) return;
+  const std::string warning = std::visit(
+      [&](const auto& scenario) { return retarget::explicit_step_warning(scenario.scene, scene.dt_s, scene.damping_time_s); }, scene.scenario);
+  if (!warning.empty()) scene.warnings.push_back(warning);
 }
 
 /// `written`: with the body as the files have it.
@@ -197,6 +206,7 @@ int simulate(const SimulateCommand& command) {
     report.accuracy = chosen->report;
   }
   const retarget::SimulationOptions options = options_of(command, scene);
+  warn_of_steps(scene);
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   const retarget::Simulation simulation = std::visit(
       [&](auto& scenario) {

@@ -113,6 +113,7 @@ class SceneReader {
       scenario_.youngs_modulus = std::max(scenario_.youngs_modulus, material.youngs_modulus);
     }
     if (is_calibrated) calibrate();
+    scene_.damping_time_s = damping_time;
     make_body_ = maker_of(scene_.law, damping_time);
     scenario_.scene.body = make_body_(mesh_);
     scenario_.length = (mesh_.rest.rowwise().maxCoeff() - mesh_.rest.rowwise().minCoeff()).maxCoeff();

@@ -20,6 +20,7 @@ struct SceneFile {
   physics::Method method = physics::Method::kExplicit;
   bool method_is_auto = true;
   double dt_s = 1.0 / 240, duration_s = 2;
+  double damping_time_s = 0;  // dashpot over spring
   unsigned seed = 0;
   std::vector<std::string> warnings;
 };

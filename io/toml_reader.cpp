@@ -74,6 +74,18 @@ std::size_t changes_between(const std::string& one, const std::string& other) {
   return row.back();
 }
 
+/// A key without its unit: without what of at most three letters stands behind underscores at its end.
+std::string without_unit(std::string key) {
+  for (std::size_t at = key.rfind('_'); at != std::string::npos && at > 0 && key.size() - at <= 4; at = key.rfind('_')) key.resize(at);
+  return key;
+}
+
+/// Whether a key means the other one in another unit, or without any.
+bool is_in_another_unit(const std::string& key, const std::string& other) {
+  const std::string quantity = without_unit(other);
+  return key == quantity || key.starts_with(quantity + "_");
+}
+
 }  // namespace
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
@@ -114,8 +126,12 @@ bool TomlReader::has(const std::string& key) const { return find(key) != nullptr
 
 const toml::node& TomlReader::need(const std::string& key) const {
   const toml::node* node = find(key);
-  if (node == nullptr) throw refusal(key, named(key) + " is missing", "Add " + key + " = ...");
-  return *node;
+  if (node != nullptr) return *node;
+  for (const auto& [other, value] : *table_) {
+    const std::string word(other.str());
+    if (!asked_.contains(word) && is_in_another_unit(word, key)) throw not_known(other, {key});
+  }
+  throw refusal(key, named(key) + " is missing", "Add " + key + " = ...");
 }
 
 Error TomlReader::refusal(const std::string& key, const std::string& what, const std::string& mend) const {
@@ -243,14 +259,17 @@ std::vector<TomlReader> TomlReader::tables(const std::string& key) const {
   return result;
 }
 
+Error TomlReader::not_known(const toml::key& key, const std::vector<std::string>& known) const {
+  const std::string word(key.str());
+  const auto alike = std::find_if(known.begin(), known.end(), [&](const std::string& other) { return is_in_another_unit(word, other); });
+  const std::string nearest = alike != known.end() ? *alike : nearest_word(word, known);
+  return {file_->string(), "line " + std::to_string(key.source().begin.line), named(word) + " is not known here",
+          nearest.empty() ? "Known are " + joined(known) + "." : "Did you mean '" + nearest + "'?"};
+}
+
 void TomlReader::refuse_others() const {
   for (const auto& [key, node] : *table_) {
-    const std::string word(key.str());
-    if (asked_.contains(word)) continue;
-    const std::vector<std::string> known(asked_.begin(), asked_.end());
-    const std::string nearest = nearest_word(word, known);
-    throw Error(file_->string(), "line " + std::to_string(key.source().begin.line), named(word) + " is not known here",
-                nearest.empty() ? "Known are " + joined(known) + "." : "Did you mean '" + nearest + "'?");
+    if (!asked_.contains(std::string(key.str()))) throw not_known(key, {asked_.begin(), asked_.end()});
   }
 }
 

@@ -65,6 +65,7 @@ class TomlReader {
  private:
   const toml::node* find(const std::string& key) const;
   const toml::node& need(const std::string& key) const;
+  Error not_known(const toml::key& key, const std::vector<std::string>& known) const;
   double number_in(const std::string& key, const toml::node& node, const Within& within) const;
   std::string named(const std::string& key) const;
 

@@ -19,7 +19,7 @@ constexpr double kDeepestCorner = 0.5;  // of the face's size [-]: what is deepe
 
 template <int Dim>
 ContactSet<Dim>::ContactSet(const SceneOf<Dim>& scene)
-    : scene_(scene), first_obstacle_(scene.has_ground ? 1 : 0), itself_(scene) {
+    : scene_(scene), first_obstacle_(scene.has_ground ? 1 : 0), itself_(scene), way_out_(scene) {
   const ContactPointsOf<Dim>& points = scene.contact_points;
   candidates_.reserve(static_cast<std::size_t>(itself_.slot_count()));
   if (points.count() == 0 || (!scene.has_ground && scene.obstacles.empty())) return;
@@ -78,6 +78,22 @@ double ContactSet<Dim>::distance(const PointsOf<Dim>& travel, int surface, const
   }
   return signed_distance<Dim>(scene_.obstacles[static_cast<std::size_t>(surface - first_obstacle_)],
                               travel_of(travel, surface), point, normal);
+}
+
+template <int Dim>
+bool ContactSet<Dim>::is_led(const ContactOf<Dim>& contact) const {
+  if (contact.surface < first_obstacle_) return false;
+  const auto leads = [&](int point) { return way_out_.leads(contact.surface - first_obstacle_, point); };
+  return std::any_of(contact.points.begin(), contact.points.begin() + contact.point_count, leads);
+}
+
+template <int Dim>
+double ContactSet<Dim>::distance_of_point(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, const ContactOf<Dim>& contact,
+                                          VectorOf<Dim>& normal) const {
+  const VectorOf<Dim> place = contact.of(x);
+  const double nearest = distance(travel, contact.surface, place, normal);
+  if (!is_led(contact)) return nearest;
+  return way_out_.gap(contact.surface - first_obstacle_, travel_of(travel, contact.surface), place, nearest, normal);
 }
 
 template <int Dim>
@@ -157,6 +173,12 @@ bool ContactSet<Dim>::is_near(const StateOf<Dim>& state, int surface, const Feat
 template <int Dim>
 void ContactSet<Dim>::find(const StateOf<Dim>& state, double reach, double own_reach) {
   candidates_.clear();
+  if (starts_unknown_) {
+    way_out_.choose(state);
+  } else {
+    way_out_.let_go(state);
+  }
+  starts_unknown_ = false;
   for (std::size_t s = 0; s < slot_begin_.size(); ++s) {
     for (int f = 0; f < feature_count_[s]; ++f) {
       const Feature& feature = features_[static_cast<std::size_t>(f)];
@@ -181,7 +203,9 @@ void ContactSet<Dim>::update(const PointsOf<Dim>& x, const PointsOf<Dim>& travel
   if (contact.is_internal()) {
     itself_.update(x, contact);
   } else if (contact.point_count == 1) {
-    contact.gap = distance(travel, contact.surface, contact.of(x), contact.normal);
+    contact.gap = distance_of_point(x, travel, contact, contact.normal);
+  } else if (is_led(contact)) {
+    contact.gap = kInfinity;  // its ends and corners lead out
   } else if (contact.point_count == 2) {
     find_deepest_of_edge(x, travel, contact);
   } else {
@@ -192,7 +216,8 @@ void ContactSet<Dim>::update(const PointsOf<Dim>& x, const PointsOf<Dim>& travel
 template <int Dim>
 double ContactSet<Dim>::gap(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, const ContactOf<Dim>& contact,
                             VectorOf<Dim>& normal) const {
-  return distance(travel, contact.surface, contact.of(x), normal);
+  return contact.point_count == 1 ? distance_of_point(x, travel, contact, normal)
+                                  : distance(travel, contact.surface, contact.of(x), normal);
 }
 
 /// The least distance along an edge, which is convex in the place on it for convex obstacles: the tangents at both ends of

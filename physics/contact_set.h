@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "physics/self_contact.h"
+#include "physics/way_out.h"
 
 namespace hydrostat::physics {
 
@@ -27,6 +28,7 @@ VectorOf<Dim> impulse_in_cone(const ContactOf<Dim>& contact, const VectorOf<Dim>
 /// Finds where the body may touch ground and obstacles. Contact points are tested against every surface. What has corners
 /// or is round is also felt between them: along the edges of the contact faces the deepest place is sought, and corners and
 /// balls are held against the faces, so that an obstacle's edge inside one element does not slip through.
+/// What starts deep inside an obstacle is led out as one (WayOut).
 /// Where the scene asks for it the body is held against itself (SelfContactSet): its candidates stand behind all others.
 /// Without anything to touch, or with it, it is empty and costs nothing.
 template <int Dim>
@@ -42,7 +44,10 @@ class ContactSet {
   void find(const StateOf<Dim>& state, double reach, double own_reach);
   void find(const StateOf<Dim>& state, double reach) { find(state, reach, reach); }
   /// To be called when the state may have nothing to do with that of the last find.
-  void forget() { itself_.forget(); }
+  void forget() {
+    itself_.forget();
+    starts_unknown_ = true;
+  }
   std::vector<ContactOf<Dim>>& candidates() { return candidates_; }
   const std::vector<ContactOf<Dim>>& candidates() const { return candidates_; }
   /// Brings gap and normal of a candidate, and the place of one between the contact points, to `x`.
@@ -68,6 +73,9 @@ class ContactSet {
   };
   VectorOf<Dim> travel_of(const PointsOf<Dim>& travel, int surface) const;
   double distance(const PointsOf<Dim>& travel, int surface, const VectorOf<Dim>& point, VectorOf<Dim>& normal) const;
+  /// The same for a contact point, which may be led out another way than the nearest.
+  double distance_of_point(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, const ContactOf<Dim>& contact, VectorOf<Dim>& normal) const;
+  bool is_led(const ContactOf<Dim>& contact) const;
   bool is_near(const StateOf<Dim>& state, int surface, const Feature& feature, double reach) const;
   void take_shares(ContactOf<Dim>& contact) const;
   void find_deepest_of_edge(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, ContactOf<Dim>& contact) const;
@@ -83,6 +91,8 @@ class ContactSet {
   Eigen::VectorXd inverse_mass_;         // [1/kg] of the nodes, 0 of held ones
   std::vector<ContactOf<Dim>> candidates_, point_contacts_;
   SelfContactSet<Dim> itself_;
+  WayOut<Dim> way_out_;
+  bool starts_unknown_ = true;
 };
 
 }  // namespace hydrostat::physics

@@ -1,17 +1,38 @@
 #include "physics/elastic_forces.h"
 
+#include "physics/elastic_sweep.h"
+
+// The sweep is compiled twice, for every processor and for those with AVX2 and fused multiply-add, as those over elements are
+// (element_forces.cpp), and chosen at run time: results depend on the processor, never on the threads.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define HYDROSTAT_FLATTEN [[gnu::flatten]]
+#define HYDROSTAT_WIDE [[gnu::flatten, gnu::target("avx2,fma")]]
+#else
+#define HYDROSTAT_FLATTEN
+#endif
+
 namespace hydrostat::physics {
 namespace {
 
 template <int Dim>
-void add_volume_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, PointsOf<Dim>& force) {
-  for (int t = 0; t < body.volume_stiffness.size(); ++t) {
-    double jacobian;
-    const Eigen::Matrix<double, Dim, Dim + 1> gradient =
-        jacobian_gradient<Dim>(x, body.tets, t, body.rest_volume[t], jacobian);
-    const double pressure = body.volume_stiffness[t] * (1 - jacobian);
-    for (int k = 0; k <= Dim; ++k) force.col(body.tets(k, t)) += pressure * gradient.col(k);
-  }
+HYDROSTAT_FLATTEN void add_forces(const ElasticSweep<Dim>& sweep) {
+  sweep.add_forces();
+}
+
+#ifdef HYDROSTAT_WIDE
+template <int Dim>
+HYDROSTAT_WIDE void add_forces_wide(const ElasticSweep<Dim>& sweep) {
+  sweep.add_forces();
+}
+#endif
+
+template <int Dim>
+void add_forces_here(const ElasticSweep<Dim>& sweep) {
+#ifdef HYDROSTAT_WIDE
+  static const bool is_wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  if (is_wide) return add_forces_wide(sweep);
+#endif
+  add_forces(sweep);
 }
 
 }  // namespace
@@ -34,16 +55,7 @@ double elastic_energy(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, cons
 template <int Dim>
 void add_elastic_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const Eigen::VectorXd& activation,
                         PointsOf<Dim>& force) {
-  for (int e = 0; e < body.edge_count(); ++e) {
-    const int i = body.edges(0, e), j = body.edges(1, e);
-    const VectorOf<Dim> span = x.col(j) - x.col(i);
-    const double length = span.norm();
-    if (length == 0) continue;  // no direction
-    const VectorOf<Dim> pull = (body.edge_stiffness[e] * (length - activation[e] * body.rest_length[e]) / length) * span;
-    force.col(i) += pull;
-    force.col(j) -= pull;
-  }
-  add_volume_forces(body, x, force);
+  add_forces_here(ElasticSweep<Dim>{body, x.data(), nullptr, activation.data(), force.data()});
 }
 
 template <int Dim>
@@ -64,32 +76,13 @@ double damping_potential(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, c
 template <int Dim>
 void add_damping_forces(const BodyOf<Dim>& body, const ConstPointsOf<Dim>& x, const ConstPointsOf<Dim>& v,
                         PointsOf<Dim>& force) {
-  for (int e = 0; e < body.edge_count(); ++e) {
-    const int i = body.edges(0, e), j = body.edges(1, e);
-    const VectorOf<Dim> span = x.col(j) - x.col(i);
-    const double length_squared = span.squaredNorm();
-    if (length_squared == 0) continue;
-    const VectorOf<Dim> pull = (body.edge_damping[e] * (v.col(j) - v.col(i)).dot(span) / length_squared) * span;
-    force.col(i) += pull;
-    force.col(j) -= pull;
-  }
+  add_forces_here(ElasticSweep<Dim>{body, x.data(), v.data(), nullptr, force.data()});
 }
 
 template <int Dim>
 void add_internal_forces(const BodyOf<Dim>& body, const StateOf<Dim>& state, const Eigen::VectorXd& activation,
                          PointsOf<Dim>& force) {
-  for (int e = 0; e < body.edge_count(); ++e) {
-    const int i = body.edges(0, e), j = body.edges(1, e);
-    const VectorOf<Dim> span = state.x.col(j) - state.x.col(i);
-    const double length_squared = span.squaredNorm();
-    if (length_squared == 0) continue;
-    const double rate = (state.v.col(j) - state.v.col(i)).dot(span) / length_squared;
-    const double spring = body.edge_stiffness[e] * (1 - activation[e] * body.rest_length[e] / std::sqrt(length_squared));
-    const VectorOf<Dim> pull = (spring + body.edge_damping[e] * rate) * span;
-    force.col(i) += pull;
-    force.col(j) -= pull;
-  }
-  add_volume_forces(body, state.x, force);
+  add_forces_here(ElasticSweep<Dim>{body, state.x.data(), state.v.data(), activation.data(), force.data()});
 }
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                                \

@@ -108,6 +108,53 @@ TYPED_TEST(ElasticForces, AndDashpotsAreTheInternalForces) {
   }
 }
 
+/// The body with but some of its edges and tets.
+template <int Dim>
+BodyOf<Dim> part_of(BodyOf<Dim> body, Eigen::Index first_edge, Eigen::Index edges, Eigen::Index first_tet, Eigen::Index tets) {
+  const auto keep = [](auto& numbers, Eigen::Index first, Eigen::Index count) {
+    const auto kept = numbers.middleCols(first, count).eval();
+    numbers = kept;
+  };
+  const auto keep_rows = [](Eigen::VectorXd& numbers, Eigen::Index first, Eigen::Index count) {
+    numbers = numbers.segment(first, count).eval();
+  };
+  keep(body.edges, first_edge, edges);
+  for (Eigen::VectorXd* numbers : {&body.rest_length, &body.edge_stiffness, &body.edge_damping}) keep_rows(*numbers, first_edge, edges);
+  keep(body.tets, first_tet, tets);
+  for (Eigen::VectorXd* numbers : {&body.rest_volume, &body.volume_stiffness}) keep_rows(*numbers, first_tet, tets);
+  return body;
+}
+
+TYPED_TEST(ElasticForces, AreTheSumOverEdgesAndTetsHoweverManyThereAre) {
+  constexpr int Dim = TypeParam::kDim;
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    const Deformed<Dim> d = deformed<Dim>(seed);
+    for (Eigen::Index count = 0; count < std::min<Eigen::Index>(10, d.body.tet_count()); ++count) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", " + std::to_string(count));
+      PointsOf<Dim> together = d.force, one_by_one = d.force;
+      const Eigen::VectorXd activation = d.activation.segment(seed, count);
+      add_internal_forces(part_of<Dim>(d.body, seed, count, 0, count), d.state, activation, together);
+      for (Eigen::Index k = 0; k < count; ++k) {
+        const BodyOf<Dim> one = part_of<Dim>(d.body, seed + k, 1, k, 1);
+        add_internal_forces(one, d.state, activation.segment(k, 1), one_by_one);
+      }
+      EXPECT_EQ(together.isZero(0), count == 0);
+      EXPECT_LE((together - one_by_one).norm(), 1e-13 * one_by_one.norm());
+      const Eigen::VectorXd sum = together.rowwise().sum();
+      EXPECT_LE(sum.norm(), 1e-13 * together.norm());
+    }
+  }
+}
+
+TYPED_TEST(ElasticForces, AreNoNumberWhereAPlaceIsNone) {
+  constexpr int Dim = TypeParam::kDim;
+  Deformed<Dim> d = deformed<Dim>(2);
+  const int node = d.body.edges(0, d.body.edge_count() / 2);
+  d.state.x(1, node) = std::nan("");
+  add_internal_forces(d.body, d.state, d.activation, d.force);
+  EXPECT_TRUE(d.force.col(node).hasNaN());
+}
+
 TYPED_TEST(ElasticForces, LeaveItToDashpotsToBrakeAllButRigidMotion) {
   constexpr int Dim = TypeParam::kDim;
   for (unsigned seed = 0; seed < kSeeds; ++seed) {

@@ -9,7 +9,7 @@ namespace hydrostat::stability {
 struct Case {
   std::string group;   // a row of README's table
   std::string name;    // what is told apart in a group, such as "dt_1_60"
-  std::string body;    // "springs", "tets" or "hexes"
+  std::string body;    // "springs", "tets" or "hexes"; in the plane "flat springs", "triangles" or "quads"
   std::string method;  // as README names it
   int nodes;           // wished
   std::string scene;   // a scene file (README, "Scene files")

@@ -56,9 +56,10 @@ bool WayOut<Dim>::leaves_by_opposite_sides(const StateOf<Dim>& state, int obstac
 template <int Dim>
 void WayOut<Dim>::mark_inside(const StateOf<Dim>& state, int obstacle) {
   VectorOf<Dim> normal;
+  const ObstacleOf<Dim>& from = scene_.obstacles[static_cast<std::size_t>(obstacle)];
+  const VectorOf<Dim> travel = travel_of(state, obstacle);
   for (int p = 0; p < scene_.contact_points.count(); ++p) {
-    led_[place_of(obstacle, p)] = signed_distance<Dim>(scene_.obstacles[static_cast<std::size_t>(obstacle)], travel_of(state, obstacle),
-                                                       scene_.contact_points.of(state.x, p), normal) < 0;
+    led_[place_of(obstacle, p)] = signed_distance<Dim>(from, travel, scene_.contact_points.of(state.x, p), normal) < 0;
   }
 }
 

@@ -21,7 +21,8 @@ class WayOut {
   bool leads(int obstacle, int point) const { return is_leading_ && led_[place_of(obstacle, point)] != 0; }
   /// From the side that leads out [m], negative below it, whose outward normal becomes `normal`; `distance` and `normal` are
   /// those of the obstacle itself, which stay for what is outside.
-  double gap(int obstacle, const VectorOf<Dim>& travel, const VectorOf<Dim>& place, double distance, VectorOf<Dim>& normal) const;
+  double gap(int obstacle, const VectorOf<Dim>& travel, const VectorOf<Dim>& place, double distance,
+             VectorOf<Dim>& normal) const;
 
  private:
   struct Side {

@@ -26,11 +26,13 @@ std::string explicit_step_warning(const physics::SceneOf<Dim>& scene, double dt,
   const double undamped = substep_with<Dim>(scene, 0, dt), k = 4 / (undamped * undamped), d = (4 - h * h * k) / (2 * h);
   const double share = (4 - wanted * wanted * k) / (2 * wanted * d);
   char text[320];
-  const int count = std::snprintf(text, sizeof text, "method 'explicit' would want %.0f substeps of a step, where it may take %.0f: its guard 'euler' takes every step; ",
+  const int count = std::snprintf(text, sizeof text,
+                                  "method 'explicit' would want %.0f substeps of a step, where it may take %.0f: its guard 'euler' takes "
+                                  "every step; ",
                                   dt / h, kMostSubsteps);
   if (damping_time > 0 && share > 0) {
-    std::snprintf(text + count, sizeof text - static_cast<std::size_t>(count), "give [material] damping_time_s = %.1g or less, or take method \"implicit\"",
-                  kSpare * share * damping_time);
+    std::snprintf(text + count, sizeof text - static_cast<std::size_t>(count),
+                  "give [material] damping_time_s = %.1g or less, or take method \"implicit\"", kSpare * share * damping_time);
   } else {
     std::snprintf(text + count, sizeof text - static_cast<std::size_t>(count), "take method \"implicit\" or a smaller dt_s");
   }

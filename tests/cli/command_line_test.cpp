@@ -68,6 +68,7 @@ TEST(OneLine, HoldsFilePlaceFaultAndMend) {
       "walk.glb: bone 'LeftFoot': inverse bind matrix is singular. Give the bone a scale other than 0.");
   EXPECT_EQ(one_line({"walk.glb", "", "cannot be\nread.", "Check it"}), "walk.glb: cannot be read. Check it.");
   EXPECT_EQ(one_line({"", "", "lost", ""}), "lost.");
+  EXPECT_EQ(one_line({"", "", "lost", "Did you mean 'found'?"}), "lost. Did you mean 'found'?");
 }
 
 }  // namespace

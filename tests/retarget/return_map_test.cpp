@@ -77,7 +77,7 @@ TEST(ReturnMap, KeepsABodyOnItsWayThatWouldDriftFromItEvenIfItAnswersOtherwiseTh
         ReturnMap map(going(ContactState::kSlide, stride), kLength, make_box_creature().scene.body);
         const ReturnMap::Answers answers = plant.answers();
         plant.response *= share;
-        plant.drift *= share;
+        plant.drift = alone.drift = random_plant(seed + 1000, stride).drift;  // friction is not as planned
         double late = 0;
         for (int cycle = 0; cycle < 30; ++cycle) {
           plant.go(map.handles(), cycle == 0);
@@ -87,7 +87,7 @@ TEST(ReturnMap, KeepsABodyOnItsWayThatWouldDriftFromItEvenIfItAnswersOtherwiseTh
           if (cycle >= 20) late = std::max(late, length_of(plant.error));
         }
         ASSERT_TRUE(map.has_learned());
-        EXPECT_LT(late, 0.01);
+        EXPECT_LT(late, 0.006);
         EXPECT_LT(late, 0.05 * length_of(alone.error));
       }
     }

@@ -10,22 +10,23 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr int kCyclesAhead = 4;         // over which errors count
-constexpr double kTrial = 0.005;        // activation of a handle while a model is asked; four times that answers four times
-constexpr double kMost = 0.03;          // activation of a handle
-constexpr double kEffort = 0.6;         // per activation of a handle, where errors count per L
-constexpr double kLeastDrift = 0.003;   // per L, a cycle: less is left alone
-constexpr double kNews = 0.5;           // share of what a cycle did beyond what was foreseen that counts as drift
-constexpr double kSurprise = 0.05;      // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
-constexpr double kAstray = 0.3;         // per L, of a model's cycle
+constexpr int kCyclesAhead = 4;        // over which errors count
+constexpr double kTrial = 0.005;       // activation of a handle while a model is asked; four times that answers four times
+constexpr double kMost = 0.03;         // activation of a handle
+constexpr double kEffort = 0.6;        // per activation of a handle, where errors count per L
+constexpr double kLeastDrift = 0.003;  // per L, a cycle: less is left alone
+constexpr double kNews = 0.5;          // share of what a cycle did beyond what was foreseen that counts as drift
+constexpr double kSurprise = 0.05;  // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
+constexpr double kAstray = 0.3;     // per L, of a model's cycle
 
 /// An error of the way in lengths per L: a turn counts by how far it takes the ends of a body of length L.
 Eigen::Vector3d per_length(const WayError& error, double length) {
   return {0.5 * error[0], error[1] / length, error[2] / length};
 }
 
-/// Activations that make the body longer on its right than on its left, and those that do so in front and the opposite behind; up to
-/// 1, E x 2. Front is one end of the longest axis on the ground of the rest shape, as it lies in the target's first frame.
+/// Activations that make the body longer on its right than on its left, and those that do so in front and the opposite
+/// behind; up to 1, E x 2. Front is one end of the longest axis on the ground of the rest shape, as it lies in the target's
+/// first frame.
 Eigen::MatrixXd sideways_bends(const physics::Body& body, const Motion& target) {
   const Eigen::VectorXd shares = body.mass / body.mass.sum();
   const RigidFit fit = best_rigid_fit(body.rest, target.at(0), shares);

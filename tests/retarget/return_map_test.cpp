@@ -72,7 +72,8 @@ TEST(ReturnMap, KeepsABodyOnItsWayThatWouldDriftFromItEvenIfItAnswersOtherwiseTh
   for (unsigned seed = 0; seed < 50; ++seed) {
     for (const double stride : {0.0, 0.3 * kLength}) {
       for (const double share : {0.7, 1.0, 1.3}) {
-        SCOPED_TRACE("seed " + std::to_string(seed) + " stride " + std::to_string(stride) + " share " + std::to_string(share));
+        SCOPED_TRACE("seed " + std::to_string(seed) + " stride " + std::to_string(stride) + " share " +
+                     std::to_string(share));
         Plant plant = random_plant(seed, stride), alone = plant;
         ReturnMap map(going(ContactState::kSlide, stride), kLength, make_box_creature().scene.body);
         const ReturnMap::Answers answers = plant.answers();

@@ -8,6 +8,7 @@
 #include "retarget/fall.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
+#include "retarget/return_map.h"
 #include "retarget/stride_feedback.h"
 
 namespace hydrostat::retarget {
@@ -44,6 +45,10 @@ class Run {
 
  private:
   void look_at_contacts();
+  void look_at_body();
+  void keep_way();
+  ReturnMap::Answers ask_model() const;
+  WayError go_for_a_cycle(const ReturnMap::Handles& handles);
   void control();
   void activate(double share_of_step);
   physics::Termination advance();
@@ -63,6 +68,8 @@ class Run {
   Observer observer_;
   ReferenceGlide glide_;
   StrideFeedback stride_;
+  ReturnMap return_map_;
+  long cycles_ = 0;  // of a loop, whose ends were seen
 
   double time_s_ = 0, busy_s_ = 0;
   Eigen::VectorXd correction_;                  // of the muscles
@@ -96,6 +103,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       observer_(options.observation, control_s_),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
+      return_map_(input.prepared, input.length, input.scene.body),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
       state_(first_state(target_, curve_)),
       activation_(input.scene.body.edge_count()),
@@ -139,6 +147,51 @@ void Run::look_at_contacts() {
   }
 }
 
+/// Once a cycle, by what is seen of the body. What steers by its stretching needs no other way.
+void Run::keep_way() {
+  const double period = target_.duration_s();
+  if (!target_.loop || stride_.steers() || time_s_ + 1e-9 < static_cast<double>(cycles_ + 1) * period) return;
+  ++cycles_;
+  return_map_.end_cycle(return_map_.way_error(fit_, cycles_));
+  const bool is_there_time = time_s_ + period <= options_.duration_s + 1e-9;
+  if (return_map_.wants_to_learn() && is_there_time) return_map_.learn(ask_model());
+}
+
+/// What ReturnMap::learn wants to know: the body that the corrector believes in goes for a cycle as often as that.
+ReturnMap::Answers Run::ask_model() const {
+  const ReplayInput believed{input_.model,        input_.model,     input_.prepared,    input_.muscles,
+                             input_.feed_forward, input_.clip_skin, input_.skin_points, input_.clip_rise,
+                             input_.length,       input_.size,      input_.limit};
+  ReplayOptions alone = options_;
+  alone.duration_s = 2 * target_.duration_s();
+  alone.observation = {};
+  alone.pushes.clear();
+  alone.trace = false;
+  Run first(believed, alone);
+  ReturnMap::Answers errors;
+  errors.col(0) = first.go_for_a_cycle(ReturnMap::trial(0));
+  for (int k = 0; k <= ReturnMap::kHandles; ++k) {
+    Run second(believed, alone);
+    second.state_ = first.state_;
+    second.time_s_ = first.time_s_;
+    second.cycles_ = 1;
+    errors.col(k + 1) = second.go_for_a_cycle(ReturnMap::trial(k));
+  }
+  return errors;
+}
+
+/// Nothing is measured but the error of the way at its end; NaN where the simulation diverged.
+WayError Run::go_for_a_cycle(const ReturnMap::Handles& handles) {
+  return_map_.set(handles);
+  const double end = static_cast<double>(cycles_ + 1) * target_.duration_s();
+  while (time_s_ + 1e-9 < end) {
+    control();
+    if (advance() == physics::Termination::kDiverged) return WayError::Constant(std::nan(""));
+    look_at_body();
+  }
+  return return_map_.way_error(fit_, cycles_ + 1);
+}
+
 /// The correction for the coming control step, by what is seen of the body.
 void Run::control() {
   if (!options_.correct) return;
@@ -149,9 +202,11 @@ void Run::control() {
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
   stride_.follow(fit_, control_s_);
+  keep_way();
   look_at_contacts();
   input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
   stride_.apply(time_s_ + 0.5 * control_s_, activation_);
+  return_map_.apply(time_s_ + 0.5 * control_s_, activation_);
   feedback_ = -activation_;
   corrector_.correct(seen, glided_, contact_, activation_);
   correction_ = corrector_.muscles_now();
@@ -163,6 +218,7 @@ void Run::control() {
 void Run::activate(double share_of_step) {
   input_.feed_forward(time_s_ + share_of_step * control_s_, activation_);
   stride_.apply(time_s_ + share_of_step * control_s_, activation_);
+  return_map_.apply(time_s_ + share_of_step * control_s_, activation_);
   activation_ += feedback_;
   activation_ = activation_.cwiseMax(1 - input_.limit).cwiseMin(1 + input_.limit);
 }
@@ -198,13 +254,18 @@ void Run::write_trace(long row) {
   trace.effect_moment.col(row) = step_impulses_.effect_moment / control_s_;
 }
 
-void Run::measure(long step) {
-  if (options_.trace) write_trace(step);
-  if (step % steps_per_frame_ == 0) frames_.emplace_back(column(state_.x));
+/// Where the body is and what touches it, after a control step.
+void Run::look_at_body() {
   curve_.at(time_s_, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   contact_.touching = point_states(input_.scene, state_, step_impulses_.contact, thresholds_);
   contact_.force = step_impulses_.contact / control_s_;
+}
+
+void Run::measure(long step) {
+  if (options_.trace) write_trace(step);
+  if (step % steps_per_frame_ == 0) frames_.emplace_back(column(state_.x));
+  look_at_body();
   metrics_.add({time_s_, state_, reference_, fit_, mean_activation_, correction_, step_impulses_, contact_.touching});
 }
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -17,6 +18,8 @@ using nlohmann::json;
 constexpr double kClipShape = 0.04;   // [per L] at most
 constexpr double kCycles = 4.99;      // at least
 constexpr double kMomentum = 1e-6;    // [mg]
+constexpr double kHeading = 1.5;      // [deg a cycle], over five cycles
+constexpr double kDrift = 0.003;      // [per L a cycle]
 
 struct Clip {
   const char* file;
@@ -78,7 +81,14 @@ TEST(ThirdPartyClips, TheFoxWalks) {
     }
   });
 }
-TEST(ThirdPartyClips, TheSnakeWinds) { expect_creature(kClips[1]); }
+TEST(ThirdPartyClips, TheSnakeWindsAndKeepsItsWay) {
+  expect_creature(kClips[1], [](const fs::path& creature) {
+    // Friction turns it by 3 degrees a cycle and more; what is left is how it turns back from the first.
+    const json run = report_of(creature)["replay"]["closed_loop"];
+    EXPECT_LE(std::abs(run["heading_deg_per_cycle"].get<double>()), kHeading);
+    EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), kDrift);
+  });
+}
 TEST(ThirdPartyClips, TheSlimeWalks) { expect_creature(kClips[2]); }
 
 TEST(ThirdPartyClips, TheFrogThatCannotHopSaysWhatStopsIt) {

@@ -1,0 +1,136 @@
+#include "retarget/return_map.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "retarget/reference_glide.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr int kCyclesAhead = 4;        // over which errors count
+constexpr double kTrial = 0.005;       // activation of a handle while a model is asked; four times that answers four times
+constexpr double kMost = 0.03;         // activation of a handle
+constexpr double kEffort = 0.6;        // per activation of a handle, where errors count per L
+constexpr double kLeastDrift = 0.003;  // per L, a cycle: less is left alone
+constexpr double kNews = 0.5;          // share of what a cycle did beyond what was foreseen that counts as drift
+constexpr double kSurprise = 0.05;  // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
+constexpr double kAstray = 0.3;     // per L, of a model's cycle
+
+/// An error of the way in lengths per L: a turn counts by how far it takes the ends of a body of length L.
+Eigen::Vector3d per_length(const WayError& error, double length) {
+  return {0.5 * error[0], error[1] / length, error[2] / length};
+}
+
+/// Activations that make the body longer on its right than on its left, and those that do so in front and the opposite
+/// behind; up to 1, E x 2. Front is one end of the longest axis on the ground of the rest shape, as it lies in the target's
+/// first frame.
+Eigen::MatrixXd sideways_bends(const physics::Body& body, const Motion& target) {
+  const Eigen::VectorXd shares = body.mass / body.mass.sum();
+  const RigidFit fit = best_rigid_fit(body.rest, target.at(0), shares);
+  const Eigen::Matrix3Xd arms = fit.rotation * (body.rest.colwise() - fit.mean_a);
+  const double xx = arms.row(0).cwiseAbs2() * shares, zz = arms.row(2).cwiseAbs2() * shares;
+  const double xz = arms.row(0).cwiseProduct(arms.row(2)) * shares, angle = 0.5 * std::atan2(2 * xz, xx - zz);
+  const Eigen::Vector3d along(std::cos(angle), 0, std::sin(angle)), right = along.cross(Eigen::Vector3d::UnitY());
+  Eigen::MatrixXd bends(body.edge_count(), 2);
+  for (int e = 0; e < body.edge_count(); ++e) {
+    const Eigen::Vector3d from = arms.col(body.edges(0, e)), to = arms.col(body.edges(1, e));
+    const double bend = std::pow((to - from).normalized().dot(along), 2) * right.dot(from + to);
+    bends.row(e) << bend, bend * along.dot(from + to);
+  }
+  for (auto bend : bends.colwise()) bend /= std::max(bend.cwiseAbs().maxCoeff(), 1e-300);
+  return bends;
+}
+
+/// Of the handles of one bend, at a phase in [0, 1): a swell, and what it is with the first harmonic.
+Eigen::Vector3d courses(double phase) {
+  const double angle = 2 * M_PI * phase, swell = 0.5 * (1 - std::cos(angle));
+  return {swell, swell * std::cos(angle), swell * std::sin(angle)};
+}
+
+Eigen::Matrix3d turned(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix(); }
+
+}  // namespace
+
+ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::Body& body)
+    : length_(length),
+      period_s_(plan.target.duration_s()),
+      yaw_(plan.target.yaw),
+      most_(kMost),
+      is_dragged_loop_(plan.target.loop && is_dragged(plan.contacts)) {
+  response_.setZero();
+  if (!is_dragged_loop_) return;
+  bends_ = sideways_bends(body, plan.target);
+  const Eigen::Vector3d centre = plan.target.at(0).rowwise().mean(), stride = after_cycles(plan.target, 1) * centre - centre;
+  const Eigen::Matrix3d back = turned(-yaw_);
+  const Eigen::Vector3d aside = back * Eigen::Vector3d::UnitY().cross(stride);  // by a heading of 1 rad
+  onward_ << 1, 0, 0, aside.x(), back(0, 0), back(0, 2), aside.z(), back(2, 0), back(2, 2);
+}
+
+WayError ReturnMap::way_error(const RigidFit& fit, long cycles) const {
+  const Eigen::Vector3d off = turned(-yaw_ * static_cast<double>(cycles)) * (fit.mean_b - fit.mean_a);
+  return {yaw_of(fit.rotation), off.x(), off.z()};
+}
+
+void ReturnMap::end_cycle(const WayError& error) {
+  if (!is_dragged_loop_) return;
+  const WayError news = error - (onward_ * error_ + drift_ + response_ * handles_);
+  const double surprise = per_length(news, length_).norm();
+  error_ = error;
+  if (!has_learned_) {
+    is_drifting_ = surprise > kLeastDrift;
+  } else if (surprise > kSurprise) {
+    handles_.setZero();
+    most_ /= 2;
+  } else {
+    drift_ += kNews * news;
+    steer();
+  }
+}
+
+ReturnMap::Handles ReturnMap::trial(int k) {
+  Handles handles = Handles::Zero();
+  if (k > 0) handles[k - 1] = kTrial;
+  return handles;
+}
+
+void ReturnMap::learn(const Answers& errors) {
+  was_tried_ = true;
+  for (const auto error : errors.colwise()) {
+    if (!(per_length(error, length_).norm() < kAstray)) return;
+  }
+  const WayError by_itself = errors.col(1);
+  response_ = (errors.rightCols<kHandles>().colwise() - by_itself) / kTrial;
+  drift_ = by_itself - onward_ * errors.col(0);
+  has_learned_ = true;
+  steer();
+}
+
+/// If nothing drifts after the next cycle, these handles leave the least error over the cycles ahead.
+void ReturnMap::steer() {
+  Eigen::Matrix<double, 3, kHandles> reach = response_;
+  WayError left = onward_ * error_ + drift_;
+  Eigen::MatrixXd normal = kEffort * kEffort * Eigen::MatrixXd::Identity(kHandles, kHandles);
+  Eigen::VectorXd pull = Eigen::VectorXd::Zero(kHandles);
+  for (int k = 0; k < kCyclesAhead; ++k) {
+    Eigen::Matrix<double, 3, kHandles> rows;
+    for (int h = 0; h < kHandles; ++h) rows.col(h) = per_length(reach.col(h), length_);
+    normal += rows.transpose() * rows;
+    pull += rows.transpose() * per_length(left, length_);
+    reach = onward_ * reach;
+    left = onward_ * left;
+  }
+  handles_ = -normal.ldlt().solve(pull);
+  handles_ *= most_ / std::max(handles_.cwiseAbs().maxCoeff(), most_);
+}
+
+void ReturnMap::apply(double time_s, Eigen::VectorXd& activation) const {
+  if (handles_.isZero(0)) return;
+  const double cycle = time_s / period_s_;
+  const Eigen::Vector2d bend = handles_.reshaped(3, 2).transpose() * courses(cycle - std::floor(cycle));
+  activation += bends_ * bend;
+}
+
+}  // namespace hydrostat::retarget

@@ -10,12 +10,13 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr int kCyclesAhead = 4;        // over which errors count
-constexpr double kTrial = 0.005;       // activation of a handle while a model is asked; four times that answers four times
-constexpr double kMost = 0.03;         // activation of a handle
-constexpr double kEffort = 0.6;        // per activation of a handle, where errors count per L
-constexpr double kLeastDrift = 0.003;  // per L, a cycle: less is left alone
-constexpr double kNews = 0.5;          // share of what a cycle did beyond what was foreseen that counts as drift
+constexpr int kCyclesAhead = 4;         // over which errors count
+constexpr double kTrial = 0.005;        // activation of a handle while a model is asked; four times that answers four times
+constexpr double kMost = 0.03;          // activation of a handle
+constexpr double kEffort = 0.6;         // per activation of a handle, where errors count per L
+constexpr double kLeastDrift = 0.003;   // per L, a cycle: less is left alone
+constexpr double kLeastOnLegs = 0.015;  // the same of what steps freely, for its corrector holds the way but on slopes
+constexpr double kNews = 0.5;           // share of what a cycle did beyond what was foreseen that counts as drift
 constexpr double kSurprise = 0.05;  // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
 constexpr double kAstray = 0.3;     // per L, of a model's cycle
 
@@ -58,10 +59,11 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
     : length_(length),
       period_s_(plan.target.duration_s()),
       yaw_(plan.target.yaw),
+      least_drift_(is_dragged(plan.contacts) ? kLeastDrift : kLeastOnLegs),
       most_(kMost),
-      is_dragged_loop_(plan.target.loop && is_dragged(plan.contacts)) {
+      is_loop_(plan.target.loop) {
   response_.setZero();
-  if (!is_dragged_loop_) return;
+  if (!is_loop_) return;
   bends_ = sideways_bends(body, plan.target);
   const Eigen::Vector3d centre = plan.target.at(0).rowwise().mean(), stride = after_cycles(plan.target, 1) * centre - centre;
   const Eigen::Matrix3d back = turned(-yaw_);
@@ -75,12 +77,12 @@ WayError ReturnMap::way_error(const RigidFit& fit, long cycles) const {
 }
 
 void ReturnMap::end_cycle(const WayError& error) {
-  if (!is_dragged_loop_) return;
+  if (!is_loop_) return;
   const WayError news = error - (onward_ * error_ + drift_ + response_ * handles_);
   const double surprise = per_length(news, length_).norm();
   error_ = error;
   if (!has_learned_) {
-    is_drifting_ = surprise > kLeastDrift;
+    is_drifting_ = surprise > least_drift_;
   } else if (surprise > kSurprise) {
     handles_.setZero();
     most_ /= 2;

@@ -11,20 +11,21 @@ namespace hydrostat::retarget {
 /// How far a body is from its path, seen from the target's own heading: turn about y [rad], then x and z [m].
 using WayError = Eigen::Vector3d;
 
-/// Feedback once a cycle on the way of a creature that drags itself. Its handles bend the body sideways, as a whole and the
-/// ends against each other, each with a time course that is zero where a cycle begins and ends. How a handle turns and moves
-/// a body that slides is not known from its build: it is measured, with a cycle of a model's free motion for each of them.
-/// From then on every cycle's handles are those that leave the least of the error over the cycles ahead, by damped least
-/// squares; what turns the body anew in every cycle is estimated with it. Source: Laszlo, van de Panne, Fiume, "Limit Cycle
-/// Control and its Application to the Animation of Balancing and Walking", SIGGRAPH 1996: the response of a cycle by finite
-/// differences, and its inverse once a cycle. The estimate of the drift and the cycles ahead are ours.
+/// Feedback once a cycle on the way of a loop: of what drags itself, and of legs that lose theirs, on a slope. Its handles
+/// bend the body sideways, as a whole and the ends against each other, each with a time course that is zero where a cycle
+/// begins and ends. How a handle turns and moves a body that slides is not known from its build: it is measured, with a
+/// cycle of a model's free motion for each of them. From then on every cycle's handles are those that leave the least of the
+/// error over the cycles ahead, by damped least squares; what turns the body anew in every cycle is estimated with it.
+/// Source: Laszlo, van de Panne, Fiume, "Limit Cycle Control and its Application to the Animation of Balancing and Walking",
+/// SIGGRAPH 1996: the response of a cycle by finite differences, and its inverse once a cycle. The estimate of the drift and
+/// the cycles ahead are ours.
 class ReturnMap {
  public:
   static constexpr int kHandles = 6;
   using Handles = Eigen::Matrix<double, kHandles, 1>;
   using Answers = Eigen::Matrix<double, 3, kHandles + 2>;
 
-  /// length [m] is L. Played once, or on legs that step freely, it never wants to learn and changes nothing.
+  /// length [m] is L. Of what is played once it never wants to learn and changes nothing.
   ReturnMap(const PreparedTarget& plan, double length, const physics::Body& body);
 
   /// Of a fit from the target to the body, `cycles` after the start.
@@ -51,9 +52,10 @@ class ReturnMap {
   void steer();
 
   double length_, period_s_;
-  double yaw_;   // [rad] of the target in a cycle
-  double most_;  // of a handle
-  bool is_dragged_loop_, has_learned_ = false, is_drifting_ = false, was_tried_ = false;
+  double yaw_;          // [rad] of the target in a cycle
+  double least_drift_;  // per L, a cycle
+  double most_;         // of a handle
+  bool is_loop_, has_learned_ = false, is_drifting_ = false, was_tried_ = false;
   Eigen::MatrixXd bends_;   // E x 2
   Eigen::Matrix3d onward_;  // what one cycle makes of the error of the way by itself
   Eigen::Matrix<double, 3, kHandles> response_;

@@ -23,8 +23,19 @@ constexpr double kFirstShove = 0.1;     // [m/s] at most
 constexpr double kPushCycle = 2;        // in which the push comes; seconds where a clip is played once
 constexpr int kEighths = 8, kQuarters = 4;
 
-/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15".
-void set_variant(const std::string& variant, retarget::ReplayOptions& replay) {
+/// The ground's slope [deg], rising towards -x turned by `side` [deg] about -y; the corrector's model stands on it, too.
+struct Slope {
+  double degrees = 0, side = 0;
+
+  void tilt(Eigen::Vector3d& gravity) const {
+    const double tilt = degrees * M_PI / 180, angle = side * M_PI / 180;
+    const Eigen::Vector3d down(std::sin(tilt) * std::cos(angle), -std::cos(tilt), std::sin(tilt) * std::sin(angle));
+    if (degrees != 0) gravity = gravity.norm() * down;
+  }
+};
+
+/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; or of the ground: "slope=5:side=90".
+void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Slope& slope) {
   retarget::CorrectorOptions& options = replay.corrector;
   const std::map<std::string, double*> knobs{{"effort", &options.effort},       {"settle", &options.settle_s},
                                              {"nodes", &options.node_weight},   {"root", &options.root_weight},
@@ -32,6 +43,7 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay) {
                                              {"foot", &options.foot_weight},  {"foot_settle", &options.foot_settle_s},
                                              {"step", &options.step},         {"ahead", &options.step_ahead},
                                              {"calm", &options.calm},         {"calm_error", &options.calm_error},
+                                             {"slope", &slope.degrees},       {"side", &slope.side},
                                              {"noise", &replay.observation.noise_m},
                                              {"delay", &replay.observation.delay_s}};
   std::istringstream parts(variant);
@@ -90,11 +102,13 @@ int run(int argc, char** argv) {
   }
   const std::string directory = argv[1], variant = argv[2], push = argv[4];
   const auto seed = static_cast<unsigned>(std::atoi(argv[3]));
-  const io::LoadedCreature creature = io::load_creature(directory);
-  const retarget::Performer& performer = creature.target.performer;
+  io::LoadedCreature creature = io::load_creature(directory);
+  retarget::Performer& performer = creature.target.performer;
   const retarget::Motion& target = performer.prepared.target;
   retarget::PerformOptions options;
-  set_variant(variant, options.replay);
+  Slope slope;
+  set_variant(variant, options.replay, slope);
+  slope.tilt(performer.scene.gravity);
   options.replay.duration_s = target.loop ? std::atof(argv[5]) * target.duration_s() : retarget::usual_duration(target);
   options.baselines = false;
   options.threads = 1;

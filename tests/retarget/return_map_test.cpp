@@ -95,7 +95,7 @@ TEST(ReturnMap, KeepsABodyOnItsWayThatWouldDriftFromItEvenIfItAnswersOtherwiseTh
   }
 }
 
-TEST(ReturnMap, LeavesAloneWhatIsOnItsWayStepsFreelyOrIsPlayedOnce) {
+TEST(ReturnMap, LeavesAloneWhatIsOnItsWayOrPlayedOnceAndLegsThatLoseLittle) {
   const physics::Body body = make_box_creature().scene.body;
   const auto wants = [&](const PreparedTarget& plan, const WayError& error) {
     ReturnMap map(plan, kLength, body);
@@ -106,7 +106,9 @@ TEST(ReturnMap, LeavesAloneWhatIsOnItsWayStepsFreelyOrIsPlayedOnce) {
   const WayError off(0.1, 0.02 * kLength, 0);
   EXPECT_TRUE(wants(going(ContactState::kSlide), off));
   EXPECT_FALSE(wants(going(ContactState::kSlide), 0.02 * off));
-  EXPECT_FALSE(wants(going(ContactState::kStick), off));
+  EXPECT_TRUE(wants(going(ContactState::kSlide), 0.2 * off));
+  EXPECT_FALSE(wants(going(ContactState::kStick), 0.2 * off));
+  EXPECT_TRUE(wants(going(ContactState::kStick), off));
   EXPECT_FALSE(wants(going(ContactState::kSlide, 0, 0, /*loop=*/false), off));
 }
 

@@ -5,9 +5,7 @@
 namespace hydrostat::physics {
 namespace {
 
-// Velocities half a substep beside the places let the energy of a mode at 0.8 of the stability bound swing between 1 / 1.8
-// and 1 / 0.2 of its mean.
-constexpr GuardOptions kExplicitGuard{.growth = 8};
+constexpr GuardOptions kExplicitGuard{.growth = 0.05, .is_staggered = true};
 constexpr GuardOptions kImplicitGuard{.growth = 0.5, .most_parts = 4};
 
 }  // namespace

@@ -55,6 +55,7 @@ std::unique_ptr<StepperOf<Dim>> make_stepper(Method method, const SceneOf<Dim>& 
 struct GuardOptions {
   double growth;       // of the energy [-] in a step beyond the work on the body, that the method's own velocities show when all is well
   int most_parts = 1;  // a power of two: in two, four ... parts up to it a step is tried again that follows a sound one
+  bool is_staggered = false;  // velocities lie half a substep, one pass over the body, away from the places at which forces are taken
 };
 /// A step of `accurate` that ends with an inverted tet, with much more energy than was there or was brought in, or with what
 /// is no number is tried again in shorter ones, where the options say so, and then taken again by euler, and so is every step

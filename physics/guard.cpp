@@ -31,6 +31,7 @@ class GuardedStepper final : public StepperOf<Dim> {
         forces_(scene.body),
         start_{scene.body.rest, scene.body.rest},
         part_(make_impulses(scene)),
+        place_(scene.body.rest),
         calm_energy_(kCalm * 0.5 * scene.body.mass.sum() * std::pow(push_out_speed(scene), 2)) {}
 
   double substep(double dt) const override { return accurate_->substep(dt); }
@@ -116,12 +117,14 @@ class GuardedStepper final : public StepperOf<Dim> {
   /// stability; what stays as it is in any linear body is the mean of both places around the velocity, x- and x+, as a product:
   /// x- . K x+ / 2 = 2 E((x- + x+) / 2) - (E(x-) + E(x+)) / 2. Source: Hairer, Lubich, Wanner, "Geometric numerical
   /// integration", 2006, section I.1.4 and IX.3 (the modified energy of the Stoermer-Verlet scheme).
-  double elastic_energy(const StateOf<Dim>& state, double substep) const {
+  double elastic_energy(const StateOf<Dim>& state, double substep) {
     if (!options_.is_staggered) return forces_.elastic_energy(state.x);
-    const PointsOf<Dim> half = (0.5 * substep) * state.v;
-    const PointsOf<Dim> middle = scene_.body.elements.empty() ? PointsOf<Dim>(state.x - half) : state.x;
-    return 2 * forces_.elastic_energy(middle) -
-           0.5 * (forces_.elastic_energy(middle - half) + forces_.elastic_energy(middle + half));
+    const double half = 0.5 * substep, behind = scene_.body.elements.empty() ? -half : 0;  // of the middle, from the places that are told
+    const auto energy_after = [&](double seconds) {
+      place_ = state.x + seconds * state.v;
+      return forces_.elastic_energy(place_);
+    };
+    return 2 * energy_after(behind) - 0.5 * (energy_after(behind - half) + energy_after(behind + half));
   }
 
   bool is_sound(const Eigen::VectorXd& activation, const StateOf<Dim>& state, const ImpulsesOf<Dim>& impulses, double substep) {
@@ -161,6 +164,7 @@ class GuardedStepper final : public StepperOf<Dim> {
   InternalForces<Dim> forces_;
   StateOf<Dim> start_;
   ImpulsesOf<Dim> part_;
+  PointsOf<Dim> place_;  // [m]
   double calm_energy_;          // [J]
   bool starts_unknown_ = true;  // whether the state from which the next step starts is sound
   bool is_guarding_ = false;    // the last step was euler's

@@ -30,6 +30,7 @@ constexpr double kLongestSubstep = 1.0 / 12;  // of sqrt(D / g) [-], 1/60 s at D
 constexpr double kArmijo = 1e-4;
 constexpr int kHalvings = 20;
 constexpr double kReach = 0.25;      // of the body's size [-]: what is nearer than that is watched
+constexpr double kJump = 0.05;       // of an activation between two steps [-]
 constexpr double kRounding = 1e-12;  // of the potential [-]: a smaller decrease is none
 
 /// Implicit midpoint as the minimum of a potential, by L-BFGS on top of a factored Hessian that is kept from step to step and
@@ -81,7 +82,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
                    ImpulsesOf<Dim>& impulses) override {
     if (!forces_.set_activation(activation)) return Termination::kDiverged;
-    const int substeps = static_cast<int>(std::ceil(dt / longest_substep_));
+    const int substeps = substeps_for(dt, activation);
     if (substeps == 1) return take_substep(dt, effect_force, state, impulses);
     clear(impulses);
     whole_start_ = state;
@@ -96,6 +97,17 @@ class ImplicitStepper final : public StepperOf<Dim> {
   }
 
  private:
+  /// The midpoint rule throws a stiff mode from one side to the other in every substep. Activations that jump from step to step
+  /// would push it each time it comes by; over two substeps of one activation the pushes cancel.
+  int substeps_for(double dt, const Eigen::VectorXd& activation) {
+    int substeps = static_cast<int>(std::ceil(dt / longest_substep_));
+    const bool has_jumped =
+        last_activation_.size() == activation.size() && (activation - last_activation_).cwiseAbs().maxCoeff() > kJump;
+    if (has_jumped && substeps % 2 == 1) ++substeps;
+    last_activation_ = activation;
+    return substeps;
+  }
+
   struct Pair {
     Eigen::VectorXd step, change;  // of the places and of the residual
     double inverse_product;
@@ -336,7 +348,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
   PointsOf<Dim> foreseen_;  // [m] where velocities, gravity and effects alone take the nodes
   PointsOf<Dim> damped_;    // [m] along whose edges the dashpots pull
   PointsOf<Dim> middle_, moved_, trial_, force_, residual_, last_residual_;
-  Eigen::VectorXd direction_;
+  Eigen::VectorXd direction_, last_activation_;
   StateOf<Dim> start_, whole_start_;  // of a substep; of the step
   ImpulsesOf<Dim> part_;
   double longest_substep_;  // [s]

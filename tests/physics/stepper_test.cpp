@@ -314,6 +314,26 @@ METHOD_TEST(Steppers, AllocateNothingInTheStepLoopOfElements) {
   EXPECT_EQ(allocations - before, 0);
 }
 
+/// The midpoint rule turns stiff modes round in every step: activations that do so, too, must not push them ever higher.
+TEST(Implicit, IsNotFedByActivationsThatJumpFromStepToStep) {
+  const BodyOf<2> body = bar<2>(16, 4, 1, 0.0625);
+  const SceneOf<2> scene = in_the_air(body, false);
+  for (unsigned seed = 1; seed <= trials(4U); ++seed) {
+    std::mt19937 random(seed);
+    const Eigen::VectorXd rest = Eigen::VectorXd::Ones(body.edge_count()), jump = random_activation(random, body, 0.1) - rest;
+    const auto stepper = make_implicit_stepper(scene);
+    StateOf<2> state{body.rest, PointsOf<2>::Zero(2, body.node_count())};
+    ImpulsesOf<2> impulses = make_impulses(scene);
+    double most = 0;
+    for (int s = 0; s < 240; ++s) {
+      const Eigen::VectorXd activation = rest + (s % 2 == 0 ? 1 : -1) * jump;
+      ASSERT_EQ(stepper->step(1.0 / 240, activation, nullptr, state, impulses), Termination::kDone);
+      most = std::max(most, energy(scene, state, rest));
+    }
+    EXPECT_LT(most, elastic_energy<2>(body, body.rest, rest + jump)) << "seed " << seed;
+  }
+}
+
 TEST(Explicit, AllocatesNothingWhereThreadsShareTheStep) {
   SceneOf<2> scene = in_the_air<2>(make_body(element_bar<2>({60, 45}, {0.6, 0.45}, Cut::kTwoTriangles), {}), false);
   scene.threads = 2;

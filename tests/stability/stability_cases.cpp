@@ -181,7 +181,6 @@ void add_contacts(std::vector<Hard>& list) {
                  "\n[[obstacle.move]]\nvelocity_m_s = [0.0, -0.21, 0.0]\nuntil_s = 1.0\n"
                  "\n[[obstacle.move]]\nvelocity_m_s = [0.0, 1.0, 0.0]\nfrom_s = 1.5\nuntil_s = 1.9\n";
   squeeze.is_in_slice = squeeze.is_flat_too = true;
-  squeeze.left_out = "explicit";
   list.push_back(squeeze);
 
   const auto add = [&](const char* group, const char* name, const char* body, const std::string& rest) {

@@ -95,7 +95,7 @@ TEST(ReturnMap, KeepsABodyOnItsWayThatWouldDriftFromItEvenIfItAnswersOtherwiseTh
   }
 }
 
-TEST(ReturnMap, LeavesAloneWhatIsOnItsWayOrPlayedOnceAndLegsThatLoseLittle) {
+TEST(ReturnMap, LeavesAloneWhatIsOnItsWayWasThrownOrIsPlayedOnceAndLegsThatLoseLittle) {
   const physics::Body body = make_box_creature().scene.body;
   const auto wants = [&](const PreparedTarget& plan, const WayError& error) {
     ReturnMap map(plan, kLength, body);
@@ -109,6 +109,7 @@ TEST(ReturnMap, LeavesAloneWhatIsOnItsWayOrPlayedOnceAndLegsThatLoseLittle) {
   EXPECT_TRUE(wants(going(ContactState::kSlide), 0.2 * off));
   EXPECT_FALSE(wants(going(ContactState::kStick), 0.2 * off));
   EXPECT_TRUE(wants(going(ContactState::kStick), off));
+  EXPECT_FALSE(wants(going(ContactState::kStick), 5 * off)) << "what falls or was thrown has nothing to learn";
   EXPECT_FALSE(wants(going(ContactState::kSlide, 0, 0, /*loop=*/false), off));
 }
 

@@ -16,8 +16,8 @@ constexpr double kMost = 0.03;          // activation of a handle
 constexpr double kEffort = 0.6;         // per activation of a handle, where errors count per L
 constexpr double kLeastDrift = 0.003;   // per L, a cycle: less is left alone
 constexpr double kLeastOnLegs = 0.015;  // the same of what steps freely, for its corrector holds the way but on slopes
+constexpr double kThrown = 0.15;        // the same: what goes further astray falls or was pushed, and bends do not bring it back
 constexpr double kNews = 0.5;           // share of what a cycle did beyond what was foreseen that counts as drift
-constexpr double kThrown = 0.15;         // the same: what goes so far astray falls or was pushed, and bends do not bring it back
 constexpr double kSurprise = 0.05;  // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
 constexpr double kAstray = 0.3;     // per L, of a model's cycle
 

@@ -28,7 +28,7 @@ struct Hard {
   double least_creep_m_s = -1;
   bool is_in_slice = false;
   bool is_flat_too = false;  // in the plane as well
-  std::string left_out = {};  // the method that the short run does without: it takes long there, or does not pass in the plane
+  std::string left_out = {};  // the method that the short run does without: it takes long there
   bool is_refused = false;
   std::string mesh = {};  // of shape "mesh", which no lattice of hexahedra has
 };

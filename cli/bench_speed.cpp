@@ -17,6 +17,7 @@
 #include "io/write_file.h"
 #include "retarget/creature.h"
 #include "retarget/performed_scenario.h"
+#include "retarget/prepare_standing.h"
 #include "retarget/run_warnings.h"
 #include "retarget/step_cost.h"
 
@@ -142,6 +143,7 @@ SpeedRow measure(const SpeedCommand& command, const retarget::Character& charact
   row.frames = static_cast<int>(motion.nodes.count());
   retarget::PreparedTarget prepared;
   row.preparation_ms = ms_of(prepared, [&] { return prepared_target(creature, motion); });
+  retarget::lighten(prepared, creature.scene.body);
   retarget::InverseOptions inverse_options;
   inverse_options.limit = retarget::automatic_limit(creature.scene.body, prepared.target);
   inverse_options.threads = 1;

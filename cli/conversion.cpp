@@ -16,6 +16,7 @@
 #include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/flight.h"
+#include "retarget/prepare_standing.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
 
@@ -146,6 +147,7 @@ void Conversion::find_activations(double wished_limit) {
   const physics::Scene& scene = creature_.scene;
   key_ = key_after(key_, options_.friction);
   retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_); });
+  retarget::lighten(prepared, creature_.scene.body);
   retarget::InverseOptions inverse_options;
   inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);
   inverse_options.threads = options_.threads;

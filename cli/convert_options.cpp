@@ -79,6 +79,11 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
   app.add_option("CLIP", options.clip_file, "FBX, glTF, ... with a skeleton, a skin and a clip")->required();
   app.add_option("-o,--out", options.out, "Directory of the creature")->required();
   app.add_option("--clip", options.clip, "Clip by name or index [the first that lasts]");
+  app.add_option("--from", options.import.from_s, "Where in the clip to begin, counted from its first key [s]")
+      ->check(number_within(0, 3600))
+      ->capture_default_str();
+  app.add_option("--to", options.import.to_s, "Where in it to end [s]; otherwise at its last key")
+      ->check(number_within(0, 3600));
   add_import_options(app, options.import);
   app.add_option("--height", options.height, "Height of the bind pose [m]; otherwise the file's")
       ->check(number_within(0.01, 1000));

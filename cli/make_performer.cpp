@@ -4,14 +4,13 @@
 #include "retarget/error.h"
 #include "retarget/flight.h"
 #include "retarget/limbs.h"
+#include "retarget/prepare_standing.h"
 #include "retarget/self_contact_plan.h"
 
 namespace hydrostat::cli {
 
 retarget::PreparedTarget prepared_target(const retarget::Creature& creature, const retarget::ImportedMotion& motion) {
-  retarget::PreparedTarget prepared = retarget::prepare(
-      motion.nodes, retarget::preparation_scene(creature), retarget::bones_of(creature.contacts),
-      creature.character.skeleton.names, creature.mesh.bone_weights, creature.length, creature.size, retarget::prepare_options(motion));
+  retarget::PreparedTarget prepared = retarget::prepare_standing(creature, motion);
   retarget::find_legs(creature.character.skeleton, prepared.contacts);
   return prepared;
 }

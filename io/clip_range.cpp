@@ -1,6 +1,7 @@
 #include "io/clip_range.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <limits>
 
 #include "retarget/error.h"
@@ -57,6 +58,21 @@ ClipRange range_of(const SceneClip& clip) {
   if (clip.duration_s > 0) last = std::min(last, clip.duration_s);
   if (!(last > first)) return {};
   return {first, last, rate};
+}
+
+ClipRange cut(const ClipRange& range, double from_s, std::optional<double> to_s, const std::string& path, const std::string& place) {
+  const double end_s = to_s.value_or(range.length_s());
+  const double beyond = end_s - range.length_s();
+  if (beyond > kShortestClip || end_s - from_s < kShortestClip) {
+    const auto text = [](double time_s) {
+      char digits[32];
+      std::snprintf(digits, sizeof digits, "%.4g", time_s);
+      return std::string(digits);
+    };
+    throw Error(path, place, "it cannot be cut from " + text(from_s) + " to " + text(end_s) + " s",
+                "Give --from and --to within its " + text(range.length_s()) + " s, counted from its first key");
+  }
+  return {range.start_s + from_s, range.start_s + std::min(end_s, range.length_s()), range.key_rate_hz};
 }
 
 std::size_t choose_clip(const Scene& scene, const std::string& wanted, const std::string& path) {

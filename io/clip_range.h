@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "io/scene.h"
@@ -15,6 +16,10 @@ struct ClipRange {
   double length_s() const { return end_s - start_s; }
 };
 ClipRange range_of(const SceneClip& clip);
+
+/// What of a range is played when it is cut at times [s] counted from its start; none: to its end. Throws Error with `path` and
+/// `place` where a cut lies outside or less than a thousandth of a second is left.
+ClipRange cut(const ClipRange& range, double from_s, std::optional<double> to_s, const std::string& path, const std::string& place);
 
 /// Index of the clip that is meant by a name, an index as text or nothing (the first of non-zero length). Throws Error with
 /// `path` for an unknown clip, one of zero length, one longer than an hour, and where there is none.

@@ -75,21 +75,23 @@ void make_bone_space_rigid(retarget::Skeleton& skeleton, retarget::Clip& clip) {
 retarget::Clip sample(const Rig& rig, const Scene& scene, std::size_t index, const ImportOptions& options,
                       const std::string& path) {
   const SceneClip& source = scene.clips[index];
-  const ClipRange range = range_of(source);
+  const std::string place = "clip '" + source.name + "'";
+  const ClipRange whole = range_of(source), range = cut(whole, options.from_s, options.to_s, path, place);
   retarget::Clip clip;
   clip.name = source.name;
   clip.index = static_cast<int>(index);
   clip.range_s = range.length_s();
-  clip.duration_s = source.duration_s > 0 ? source.duration_s : range.end_s;
+  const bool is_whole = range.length_s() == whole.length_s();
+  clip.duration_s = !is_whole ? range.length_s() : (source.duration_s > 0 ? source.duration_s : range.end_s);
   clip.key_rate_hz = range.key_rate_hz;
   const int intervals = std::max(2, static_cast<int>(std::lround(options.sample_rate_hz * clip.range_s)));
   clip.rate_hz = intervals / clip.range_s;
   if (static_cast<double>(intervals) * static_cast<double>(rig.scene_nodes.size()) > kMostPoses) {
-    throw Error(path, "clip '" + clip.name + "'", "it is too long for so many bones", "Cut it into shorter clips");
+    throw Error(path, place, "it is too long for so many bones", "Cut it into shorter clips");
   }
   const auto morphs = static_cast<Eigen::Index>(rig.morph_sources.size());
   if (static_cast<double>(intervals) * static_cast<double>(morphs) > kMostPoses)
-    throw Error(path, "clip '" + clip.name + "'", "it is too long for so many morph targets", "Cut it into shorter clips");
+    throw Error(path, place, "it is too long for so many morph targets", "Cut it into shorter clips");
   clip.morph_weights.resize(morphs, intervals + 1);
   for (int f = 0; f <= intervals; ++f) {
     const double time_s = range.start_s + clip.range_s * f / intervals;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -21,6 +22,9 @@ struct ImportOptions {
   std::string up = {};  // the file's axis that points up ("z", "-y" ...); empty: what the file tells, or a guess for BVH
   double metres_per_unit = 0;  // of the file's numbers; 0: what the file tells, or a guess for BVH
   ReadLimits limits = {};
+  // What of the clip is played [s], counted from its first key; none: to its last key.
+  double from_s = 0;
+  std::optional<double> to_s = {};
 };
 
 /// Reads a character and one of its clips in metres, y up, seconds.
@@ -29,7 +33,8 @@ struct ImportOptions {
 /// character stands at the clip's first key; bone space is right-handed, orthonormal and in metres in the bind pose.
 /// Skinning is exact: sum(weight * bone_pose * inverse(bind_pose)) takes a vertex where the file has it. `warnings`, when
 /// given, receives what the importer had to decide, and `appearance` what the skin looks like. Throws Error: no file, not
-/// readable, no skeleton, no skinned mesh, no such clip (those that exist are listed), no clip of length.
+/// readable, no skeleton, no skinned mesh, no such clip (those that exist are listed), no clip of
+/// length, nothing of it between from_s and to_s.
 retarget::Character import_character(const std::string& path, const std::string& clip, const ImportOptions& options,
                                      std::vector<std::string>* warnings = nullptr, Appearance* appearance = nullptr);
 

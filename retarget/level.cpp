@@ -5,6 +5,7 @@
 
 #include "retarget/bear_loads.h"
 #include "retarget/level_target.h"
+#include "retarget/mesh_places.h"
 #include "retarget/self_contact_plan.h"
 #include "retarget/tensor_field.h"
 
@@ -98,6 +99,15 @@ SignalSet carried_signals(const Performer& solved, const SignalSet& signals, con
   return set;
 }
 
+/// What of their mass the solved creature's nodes have kept, on the level's.
+void carry_mass(const Performer& solved, const Rig& rig, Creature& level) {
+  const Eigen::VectorXd& shares = solved.prepared.mass_shares;
+  if (shares.size() == 0) return;
+  const Places places = locate(solved.mesh, rig.bone_weights, level.mesh.nodes, level.mesh.bone_weights);
+  for (Eigen::Index i = 0; i < level.scene.body.mass.size(); ++i)
+    level.scene.body.mass[i] *= shares(places.nodes.col(i)).dot(places.weights.col(i));
+}
+
 }  // namespace
 
 Creature level_body(const Rig& rig, const CreatureOptions& options, int nodes) {
@@ -109,6 +119,7 @@ Creature level_body(const Rig& rig, const CreatureOptions& options, int nodes) {
 
 Level at_level(const Performer& solved, const SignalSet& signals, const Rig& rig, const CreatureOptions& options) {
   Creature creature = level_body(rig, options, options.nodes);
+  carry_mass(solved, rig, creature);
   creature.scene.ground = solved.scene.ground;
   creature.scene.gravity = solved.scene.gravity;
   Level level;

@@ -158,6 +158,7 @@ void project(const Creature& level, double size, PreparedTarget& prepared) {
 
 PreparedTarget carried_target(const Performer& solved, const Rig& rig, const Creature& level) {
   PreparedTarget prepared = solved.prepared;
+  prepared.mass_shares.resize(0);  // they are the solved mesh's; the level's masses have them already
   prepared.target = carried_motion(solved, rig, level);
   prepared.contacts = carried_contacts(solved.prepared.contacts, rig.skeleton, level);
   project(level, solved.size, prepared);

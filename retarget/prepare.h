@@ -21,6 +21,7 @@ struct PreparedTarget {
   Motion target;             // nodes
   ContactSchedule contacts;  // labels for the scene's contact points
   Eigen::MatrixXd missing_wrench;  // 6 x F: force / (m g), moment about the COM / (m g L)
+  Eigen::VectorXd mass_shares;     // N, in (0, 1]: what of their mass the nodes keep so that the body stands; none: all
   PreparationReport report;
   std::vector<std::string> warnings;
 };

@@ -30,7 +30,7 @@ frog|$assets/fbx/frog.fbx|--clip Frog_Jump --height 0.15
 snake|$assets/gltf/snake.glb|--clip 'Side winding'
 slime|$assets/fbx/slime.fbx|--clip Slime_Walk
 cesium_man|$assets/gltf/cesium_man.gltf|
-spider|$assets/gltf/spider_animated.gltf|"
+spider|$assets/gltf/spider_animated.gltf|--from 1.375 --to 2.125 --height 0.3"
 
 cd -- "$project"
 cmake --preset release > /dev/null

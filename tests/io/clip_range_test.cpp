@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -34,6 +36,29 @@ TEST(RangeOf, StaysWithinTheTake) {
   const ClipRange range = range_of(clip_of("take", {-0.1, 0.5, 3}, 2));
   EXPECT_EQ(range.start_s, 0);
   EXPECT_EQ(range.end_s, 2);
+}
+
+TEST(Cut, CountsFromTheFirstKeyAndKeepsTheRate) {
+  const ClipRange whole{0.25, 1.25, 24};
+  const ClipRange part = cut(whole, 0.5, 0.75, "file", "clip 'walk'");
+  EXPECT_EQ(part.start_s, 0.75);
+  EXPECT_EQ(part.end_s, 1.0);
+  EXPECT_EQ(part.key_rate_hz, 24);
+  const ClipRange rest = cut(whole, 0.5, {}, "file", "clip 'walk'");
+  EXPECT_EQ(rest.end_s, 1.25);
+  EXPECT_EQ(cut(whole, 0, 1.0004, "file", "clip 'walk'").end_s, 1.25);  // as info prints it, rounded
+}
+
+TEST(Cut, RefusesWhatLiesOutsideOrLeavesNothing) {
+  for (const auto& [from, to] : {std::pair{0.5, 0.5}, {0.7, 0.2}, {0.2, 1.5}, {2.0, 3.0}}) {
+    try {
+      cut({0.25, 1.25, 24}, from, to, "spider.gltf", "clip 'all'");
+      ADD_FAILURE() << from << " " << to;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.where, "clip 'all'");
+      EXPECT_NE(error.mend.find("within its 1 s"), std::string::npos) << error.mend;
+    }
+  }
 }
 
 TEST(ChooseClip, TakesNameOrPartBehindTheArmatureOrIndex) {

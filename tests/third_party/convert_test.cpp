@@ -31,6 +31,7 @@ constexpr Clip kClips[] = {
     {"gltf/fox.glb", "--clip Walk --height 0.6"},
     {"gltf/snake.glb", "--clip 'Side winding' --nodes 150"},
     {"fbx/slime.fbx", "--clip Slime_Walk --nodes 110"},
+    {"gltf/spider_animated.gltf", "--from 1.375 --to 2.125 --height 0.3 --nodes 150"},  // its walk, of a timeline of five actions
 };
 
 fs::path assets() {
@@ -90,6 +91,19 @@ TEST(ThirdPartyClips, TheSnakeWindsAndKeepsItsWay) {
   });
 }
 TEST(ThirdPartyClips, TheSlimeWalks) { expect_creature(kClips[2]); }
+
+TEST(ThirdPartyClips, TheSpiderWalksWhoseBellyHangsOver) {
+  expect_creature(kClips[3], [](const fs::path& creature) {
+    const json report = report_of(creature), run = report["replay"]["closed_loop"];
+    EXPECT_EQ(report["source"]["duration_s"], 0.75);
+    EXPECT_NE(report["warnings"].dump().find("tip over its feet"), std::string::npos) << report["warnings"];
+    EXPECT_LE(std::abs(run["heading_deg_per_cycle"].get<double>()), 0.3);
+    EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), kDrift);
+    EXPECT_NEAR(run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>(), 1, 0.08);
+    // Its masses come along to another mesh.
+    EXPECT_EQ(hydrostat_in(creature.parent_path(), "replay creature --lod 100 -o coarse.glb --duration 3 --quiet").exit_code, 0);
+  });
+}
 
 TEST(ThirdPartyClips, TheFrogThatCannotHopSaysWhatStopsIt) {
   const fs::path file = assets() / "fbx/frog.fbx";

@@ -1,0 +1,57 @@
+#include "retarget/prepare_standing.h"
+
+#include <cstdio>
+
+#include "retarget/static_balance.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kMostShift = 0.04;  // of L, by which preparation may move the imported motion
+constexpr double kLess = 0.5;        // of the shift: so much less is worth the mass
+constexpr double kMissing = 0.01;    // [m g] of missing force that does not count
+
+PreparedTarget prepare_with(const Eigen::VectorXd& mass, const Creature& creature, const ImportedMotion& imported) {
+  physics::Scene scene = preparation_scene(creature);
+  scene.body.mass = mass;
+  return prepare(imported.nodes, scene, bones_of(creature.contacts), creature.character.skeleton.names, creature.mesh.bone_weights,
+                 creature.length, creature.size, prepare_options(imported));
+}
+
+std::string told(const StaticBalance& balance, const Creature& creature) {
+  const Eigen::VectorXd& mass = creature.scene.body.mass;
+  Eigen::Index lightest = 0, bone = 0;
+  const double least = balance.mass_shares.minCoeff(&lightest);
+  creature.mesh.bone_weights.col(lightest).maxCoeff(&bone);
+  char text[300];
+  std::snprintf(text, sizeof text,
+                "of one density the body would tip over its feet, outside which its centre of mass is by %.3g m: it keeps %.0f %% of its mass, "
+                "least of all at '%.60s', %.0f %%",
+                balance.overhang, 100 * mass.dot(balance.mass_shares) / mass.sum(),
+                creature.character.skeleton.names[static_cast<std::size_t>(bone)].c_str(), 100 * least);
+  return text;
+}
+
+}  // namespace
+
+PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& imported) {
+  const Eigen::VectorXd& mass = creature.scene.body.mass;
+  PreparedTarget prepared = prepare_with(mass, creature, imported);
+  if (prepared.report.total_shift_rms_length <= kMostShift) return prepared;
+  const StaticBalance balance =
+      balance_statically(imported.nodes, imported.skin_points, mass, ContactOptions().height * creature.size);
+  if (balance.overhang == 0 || !balance.stands) return prepared;
+  PreparedTarget lighter = prepare_with(mass.cwiseProduct(balance.mass_shares), creature, imported);
+  const bool is_better = lighter.report.total_shift_rms_length < kLess * prepared.report.total_shift_rms_length &&
+                         lighter.report.missing_wrench_rms_mg < prepared.report.missing_wrench_rms_mg + kMissing;
+  if (!is_better) return prepared;
+  lighter.mass_shares = balance.mass_shares;
+  lighter.warnings.push_back(told(balance, creature));
+  return lighter;
+}
+
+void lighten(const PreparedTarget& prepared, physics::Body& body) {
+  if (prepared.mass_shares.size() > 0) body.mass = body.mass.cwiseProduct(prepared.mass_shares).eval();
+}
+
+}  // namespace hydrostat::retarget

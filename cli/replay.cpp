@@ -114,6 +114,16 @@ int write_motion(const ReplayCommand& command, const retarget::Performer& perfor
   return tell_run(run, command.directory, file.string());
 }
 
+constexpr double kEnoughWay = 0.8;  // of the clip's travel
+
+/// What of the clip's way a replay makes: 0 where it is down or stays where it is, 1 where the clip does not travel either.
+double way_kept(const retarget::Replay& run) {
+  constexpr double kLeastTravel = 0.01;  // of L a cycle
+  if (is_down(run)) return 0;
+  const double wanted = run.report.clip_travel_per_cycle_length;
+  return wanted < kLeastTravel ? 1 : std::max(0.0, run.report.travel_per_cycle_length / wanted);
+}
+
 /// The levels that were asked for, one after the other in the creature's place; none where none were.
 class Levels {
  public:
@@ -126,19 +136,30 @@ class Levels {
     if (levels_.front().work_ms == 0) options_ = options;
     take(creature);
   }
-  /// The next coarser one, with a word on the fall of this one; false where there is none.
-  bool take_next(io::LoadedCreature& creature) {
-    if (taken_ + 1 >= levels_.size()) return false;
-    fallen_.push_back("level: on " + std::to_string(levels_[taken_].nodes) +
-                      " nodes, which the budget allows, the creature fell");
-    ++taken_;
+  /// Where the present one kept too little of the clip's way: the next coarser one, after the last the best of them, with a word on
+  /// each that was left. False where there is none.
+  bool take_better(double way, io::LoadedCreature& creature) {
+    if (way >= kEnoughWay || levels_.empty() || ways_.size() == levels_.size()) return false;
+    ways_.push_back(way);
+    std::size_t next = ways_.size();
+    if (next == levels_.size()) next = static_cast<std::size_t>(std::max_element(ways_.begin(), ways_.end()) - ways_.begin());
+    if (next == taken_) return false;
+    taken_ = next;
     take(creature);
-    std::vector<std::string>& warnings = creature.target.report.warnings;
-    warnings.insert(warnings.end(), fallen_.begin(), fallen_.end());
+    for (std::size_t k = 0; k < ways_.size(); ++k) {
+      if (k != taken_) creature.target.report.warnings.push_back(left(levels_[k].nodes, ways_[k]));
+    }
     return true;
   }
 
  private:
+  static std::string left(int nodes, double way) {
+    char text[120];
+    std::snprintf(text, sizeof text, "level: on %d nodes, which the budget allows, the creature ", nodes);
+    std::string word = "fell";
+    if (way > 0) word = "kept " + std::to_string(std::lround(100 * way)) + " % of the clip's way";
+    return text + word;
+  }
   void take(io::LoadedCreature& creature) {
     creature = stages_.run("level", [&] { return at_level(solved_, rig_, levels_[taken_], command_.level, kCommand); });
     retarget::LevelReport& report = *creature.target.report.level;
@@ -155,7 +176,7 @@ class Levels {
   std::vector<retarget::LevelCost> levels_;
   std::optional<retarget::ReplayOptions> options_;  // where the cost is not known yet
   std::size_t taken_ = 0;
-  std::vector<std::string> fallen_;
+  std::vector<double> ways_;  // of the levels tried, see way_kept
 };
 
 /// What a person is told of the level, before the replay's own line.
@@ -169,13 +190,10 @@ void tell_level(const std::optional<retarget::LevelReport>& level, const std::st
 
 /// A level may stay up and yet not get on.
 void warn_of_lost_way(const retarget::Replay& run, std::vector<std::string>& warnings) {
-  constexpr double kLost = 0.2, kLeastTravel = 0.01;  // of the clip's travel; of L a cycle
-  const retarget::ReplayReport& report = run.report;
-  const double wanted = report.clip_travel_per_cycle_length;
-  if (is_down(run) || wanted < kLeastTravel || report.travel_per_cycle_length >= (1 - kLost) * wanted) return;
+  const double way = way_kept(run);
+  if (is_down(run) || way >= kEnoughWay) return;
   char text[120];
-  std::snprintf(text, sizeof text, "level: the creature stays up, but makes %.0f %% of the clip's way: a finer level keeps it better",
-                100 * report.travel_per_cycle_length / wanted);
+  std::snprintf(text, sizeof text, "level: the creature stays up, but makes %.0f %% of the clip's way: another level may keep it better", 100 * way);
   warnings.emplace_back(text);
 }
 
@@ -207,7 +225,7 @@ int replay(const ReplayCommand& command) {
     });
   };
   retarget::Performances performances = perform();
-  while (is_down(performances.main()) && levels.take_next(creature)) {
+  while (levels.take_better(way_kept(performances.main()), creature)) {
     wobble.plan(creature.target.performer);
     performances = perform();
   }

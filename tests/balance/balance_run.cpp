@@ -121,7 +121,7 @@ int run(int argc, char** argv) {
   if (push != "none") options.replay.pushes.push_back(parse_push(push, target.loop ? target.duration_s() : 0.25));
   const retarget::Replay replay = *retarget::perform(performer, creature.signals, options).closed_loop;
   const retarget::ReplayReport& r = replay.report;
-  const double travel = r.clip_travel_per_cycle_length != 0 ? r.travel_per_cycle_length / r.clip_travel_per_cycle_length : 1;
+  const double travel = r.clip_travel_per_cycle_length > 0.01 ? r.travel_per_cycle_length / r.clip_travel_per_cycle_length : 1;
   std::printf("%s,%d,%.4g,%.3f,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g\n", r.fell ? "fell" : "up", target.loop ? 1 : 0, r.cycles,
               r.fell ? r.fall_time_s : r.duration_s, r.shape_rms_length, r.clip_shape_rms_length, r.drift_per_cycle_length,
               r.heading_deg_per_cycle, travel, r.slip_per_stance_length, r.penetration_max_size, r.real_time_factor);

@@ -1,15 +1,7 @@
 #include "physics/elastic_forces.h"
 
 #include "physics/elastic_sweep.h"
-
-// The sweep is compiled twice, for every processor and for those with AVX2 and fused multiply-add, as those over elements are
-// (element_forces.cpp), and chosen at run time: results depend on the processor, never on the threads.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define HYDROSTAT_FLATTEN [[gnu::flatten]]
-#define HYDROSTAT_WIDE [[gnu::flatten, gnu::target("avx2,fma")]]
-#else
-#define HYDROSTAT_FLATTEN
-#endif
+#include "physics/wide.h"
 
 namespace hydrostat::physics {
 namespace {
@@ -29,7 +21,7 @@ HYDROSTAT_WIDE void add_forces_wide(const ElasticSweep<Dim>& sweep) {
 template <int Dim>
 void add_forces_here(const ElasticSweep<Dim>& sweep) {
 #ifdef HYDROSTAT_WIDE
-  static const bool is_wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  static const bool is_wide = processor_is_wide();
   if (is_wide) return add_forces_wide(sweep);
 #endif
   add_forces(sweep);

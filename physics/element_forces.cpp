@@ -1,15 +1,7 @@
 #include "physics/element_forces.h"
 
 #include "physics/element_kernel.h"
-
-// The sweeps are compiled twice, for every processor and for those with AVX2 and fused multiply-add, and chosen at run time:
-// results then depend on the processor, never on the threads. Sanitizers take the plain one (their checks do not inline).
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define HYDROSTAT_FLATTEN [[gnu::flatten]]
-#define HYDROSTAT_WIDE [[gnu::flatten, gnu::target("avx2,fma")]]
-#else
-#define HYDROSTAT_FLATTEN
-#endif
+#include "physics/wide.h"
 
 namespace hydrostat::physics {
 namespace {
@@ -122,7 +114,6 @@ template <int Dim, int Nodes>
 HYDROSTAT_WIDE double energy_wide(const Sweep<Dim, Nodes>& sweep) {
   return sweep.energy();
 }
-bool processor_is_wide() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
 #endif
 
 template <int Dim, int Nodes>

@@ -130,7 +130,7 @@ int main(int argc, char** argv) {
   std::printf("| --- | --- | --- | --- | --- | --- | --- |\n");
   std::vector<std::string> crossings;
   hydrostat::bench::sweep("192 tets", hydrostat::bench::tet_bar, csv, crossings);
-  hydrostat::bench::sweep("springs, 200 nodes", hydrostat::bench::spring_bar, csv, crossings);
+  hydrostat::bench::sweep("200 nodes of springs", hydrostat::bench::spring_bar, csv, crossings);
   std::printf("\n");
   for (const std::string& crossing : crossings) std::printf("%s\n", crossing.c_str());
 }

@@ -15,6 +15,8 @@ constexpr double kBalanceWeight = 60;     // W: per mg of missing force
 constexpr double kShiftWeight = 1;        // per L of shift of the COM, per radian of the trunk
 constexpr double kBendWeight = 2;         // per L (radian) of third difference, at 60 Hz
 constexpr double kForceWeight = 0.1;      // per mg of contact force, in the midst of a stance
+constexpr double kLeapForces = 0.1;       // of these weights where the body leaves the ground: it launches and lands by force
+constexpr double kLeap = 0.05;            // [s] in the air: less is a flicker of contacts
 constexpr double kForceAloneWeight = 0.3; // where the forces alone are sought: makes their split unique
 constexpr double kEdgeForceWeight[] = {0.4, 0.2, 0.13};  // in its first and last frames: loads come and go gently
 
@@ -197,6 +199,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
   for (long c = 0; c <= 6 * frames; c += 3) problem.column_blocks.push_back(static_cast<int>(c));
   Rows rows(target, problem);
   long column = 6 * frames;
+  const double dear = contacts.flight_s(target.rate_hz) > kLeap ? kLeapForces : 1;
   for (long f = 0; f < frames; ++f) {
     const FrameBalance& frame = balances[static_cast<std::size_t>(f)];
     const long row = rows.next(), forces = frame.give.cols();
@@ -209,7 +212,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     rows.end_block(-w * frame.want);
     for (long k = 0; k < forces; ++k) {
       const int age = frames_from_edge(contacts, frame.generators[static_cast<std::size_t>(k)].point, f, target.loop);
-      rows.add(rows.next(), column + k, age < 3 ? kEdgeForceWeight[age] : kForceWeight);
+      rows.add(rows.next(), column + k, dear * (age < 3 ? kEdgeForceWeight[age] : kForceWeight));
       rows.end_block(Eigen::VectorXd::Zero(1));
       problem.column_blocks.push_back(static_cast<int>(column + k + 1));
     }

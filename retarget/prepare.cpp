@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 
 #include "retarget/balance.h"
+#include "retarget/needed_strain.h"
 #include "retarget/shape_projection.h"
 #include "retarget/smooth.h"
 
@@ -96,6 +98,19 @@ void measure(const PreparedTarget& prepared, const physics::Body& body, Preparat
   report.volume_error_rms = std::sqrt(squared / static_cast<double>(prepared.target.count()));
 }
 
+/// The strain to which the shape is held: none where the clip keeps within reach. Adds a warning where it does not.
+double reach_of(const Motion& motion, const physics::Body& body, double reach, std::vector<std::string>& warnings) {
+  const double need = needed_strain(body, motion);
+  if (need <= reach) return std::numeric_limits<double>::infinity();
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "the clip stretches and squeezes constraints by %.0f %%, the body reaches %.0f %%: its shape is held back to that; "
+                "a higher --limit or more --nodes bring it nearer",
+                100 * need, 100 * reach);
+  warnings.push_back(text);
+  return reach;
+}
+
 void lower_by(double ground, Motion& motion) {
   for (Eigen::Index r = 1; r < motion.frames.rows(); r += 3) motion.frames.row(r).array() -= ground;
 }
@@ -124,7 +139,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   const Motion locked = lock_feet(grounded, scene, contacts, holds, floor, bone_names, node_bone_weights, options.smooth_hz);
   report.foot_shift_rms_length = rms_difference(locked, grounded, body.mass) / length;
 
-  ShapeProjector projector(scene, length, options.volume);
+  ShapeProjector projector(scene, length, options.volume, reach_of(locked, body, options.reach, result.warnings));
   target = project_frames(locked, holds, floor, projector, options.smooth_hz);
   report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
   const auto remark = [&] { mark_touching(point_motion(scene.contact_points, target), kTouching * size, contacts); };

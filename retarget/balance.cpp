@@ -15,8 +15,6 @@ constexpr double kBalanceWeight = 60;     // W: per mg of missing force
 constexpr double kShiftWeight = 1;        // per L of shift of the COM, per radian of the trunk
 constexpr double kBendWeight = 2;         // per L (radian) of third difference, at 60 Hz
 constexpr double kForceWeight = 0.1;      // per mg of contact force, in the midst of a stance
-constexpr double kLeapForces = 0.1;       // of these weights where the body leaves the ground: it launches and lands by force
-constexpr double kLeap = 0.05;            // [s] in the air: less is a flicker of contacts
 constexpr double kForceAloneWeight = 0.3; // where the forces alone are sought: makes their split unique
 constexpr double kEdgeForceWeight[] = {0.4, 0.2, 0.13};  // in its first and last frames: loads come and go gently
 
@@ -189,7 +187,8 @@ class Rows {
 
 /// Unknowns: 6 per frame (move, turn), then the forces in weights, frame after frame, not negative.
 BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts,
-                                  const Centroidal& now, const std::vector<FrameBalance>& balances, double length) {
+                                  const Centroidal& now, const std::vector<FrameBalance>& balances, double length,
+                                  double force_share) {
   const long frames = target.count();
   const double rate_squared = target.rate_hz * target.rate_hz, g = scene.gravity.norm(), w = kBalanceWeight;
   const double weight = scene.body.mass.sum() * g, bend = kBendWeight * std::pow(target.rate_hz / 60, 3);
@@ -199,7 +198,6 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
   for (long c = 0; c <= 6 * frames; c += 3) problem.column_blocks.push_back(static_cast<int>(c));
   Rows rows(target, problem);
   long column = 6 * frames;
-  const double dear = contacts.flight_s(target.rate_hz) > kLeap ? kLeapForces : 1;
   for (long f = 0; f < frames; ++f) {
     const FrameBalance& frame = balances[static_cast<std::size_t>(f)];
     const long row = rows.next(), forces = frame.give.cols();
@@ -212,7 +210,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     rows.end_block(-w * frame.want);
     for (long k = 0; k < forces; ++k) {
       const int age = frames_from_edge(contacts, frame.generators[static_cast<std::size_t>(k)].point, f, target.loop);
-      rows.add(rows.next(), column + k, dear * (age < 3 ? kEdgeForceWeight[age] : kForceWeight));
+      rows.add(rows.next(), column + k, force_share * (age < 3 ? kEdgeForceWeight[age] : kForceWeight));
       rows.end_block(Eigen::VectorXd::Zero(1));
       problem.column_blocks.push_back(static_cast<int>(column + k + 1));
     }
@@ -260,10 +258,10 @@ std::vector<ContactGenerator> contact_generators(const ContactSchedule& contacts
 }
 
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots) {
+                 double support_friction, int max_pivots, double force_share) {
   const Centroidal now = centroidal(target, scene.body);
   const std::vector<FrameBalance> balances = frame_balances(target, now, scene, contacts, length, support_friction);
-  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length);
+  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, force_share);
   const long frames = target.count(), forces = problem.lower.size() - 6 * frames;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(problem.lower.size());
   start.tail(forces).setConstant(1e-3);

@@ -16,6 +16,9 @@ namespace {
 
 constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
+constexpr double kFar = 0.04;         // of L: further no shift should move a clip
+constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
+constexpr double kLeapForces = 0.1;   // share of the forces' cost for a leap that would be moved further
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
 
 double rms_difference(const Motion& a, const Motion& b, const Eigen::VectorXd& mass) {
@@ -43,6 +46,15 @@ ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, co
   std::size_t chosen = 0;
   while (badness[chosen] > std::max(kGoodBalance, kWorseBalance * least)) ++chosen;
   return schedules[chosen];
+}
+
+/// A leap launches and lands by force: where loads that come and go gently would move it too far, they cost less.
+double force_share(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
+                   double support_friction) {
+  if (contacts.flight_s(target.rate_hz) < kLeap) return 1;
+  const Shift shift = find_shift(target, scene, contacts, length, support_friction);
+  const double far = std::sqrt(shift.move.squaredNorm() / static_cast<double>(shift.move.cols()));
+  return far > kFar * length ? kLeapForces : 1;
 }
 
 /// The foot lock: the mean offset of each patch to its holds moves its bone's nodes and fades out over the frames around the contact.
@@ -146,8 +158,9 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   remark();
   const Motion before_momentum = target;
   Motion wanted = locked;  // the animator's shape with the shifts so far
+  const double share = options.momentum ? force_share(target, scene, contacts, length, options.support_friction) : 1;
   for (int round = 0; options.momentum && round < options.rounds; ++round) {
-    const Shift shift = find_shift(target, scene, contacts, length, options.support_friction);
+    const Shift shift = find_shift(target, scene, contacts, length, options.support_friction, 60, share);
     wanted = shifted(wanted, shift, body);
     target = project_frames(wanted, holds, floor, projector, options.smooth_hz);
     fall_freely(contacts, scene, target);

@@ -187,7 +187,8 @@ class Rows {
 
 /// Unknowns: 6 per frame (move, turn), then the forces in weights, frame after frame, not negative.
 BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts,
-                                  const Centroidal& now, const std::vector<FrameBalance>& balances, double length) {
+                                  const Centroidal& now, const std::vector<FrameBalance>& balances, double length,
+                                  double force_share) {
   const long frames = target.count();
   const double rate_squared = target.rate_hz * target.rate_hz, g = scene.gravity.norm(), w = kBalanceWeight;
   const double weight = scene.body.mass.sum() * g, bend = kBendWeight * std::pow(target.rate_hz / 60, 3);
@@ -209,7 +210,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     rows.end_block(-w * frame.want);
     for (long k = 0; k < forces; ++k) {
       const int age = frames_from_edge(contacts, frame.generators[static_cast<std::size_t>(k)].point, f, target.loop);
-      rows.add(rows.next(), column + k, age < 3 ? kEdgeForceWeight[age] : kForceWeight);
+      rows.add(rows.next(), column + k, force_share * (age < 3 ? kEdgeForceWeight[age] : kForceWeight));
       rows.end_block(Eigen::VectorXd::Zero(1));
       problem.column_blocks.push_back(static_cast<int>(column + k + 1));
     }
@@ -257,10 +258,10 @@ std::vector<ContactGenerator> contact_generators(const ContactSchedule& contacts
 }
 
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots) {
+                 double support_friction, int max_pivots, double force_share) {
   const Centroidal now = centroidal(target, scene.body);
   const std::vector<FrameBalance> balances = frame_balances(target, now, scene, contacts, length, support_friction);
-  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length);
+  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, force_share);
   const long frames = target.count(), forces = problem.lower.size() - 6 * frames;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(problem.lower.size());
   start.tail(forces).setConstant(1e-3);

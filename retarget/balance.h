@@ -27,9 +27,9 @@ struct Shift {
 
 /// The least shift of the COM and turn of the trunk with which gravity, contact forces inside the friction pyramid and momentum, linear
 /// and angular, balance in every frame. length [m] is L. Source: Kajita's and Wensing's centroidal balance in the form of the design,
-/// section 5; weights measured on our clips.
+/// section 5; weights measured on our clips. Forces cost `force_share` of their usual weight, which lets loads come and go gently.
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots = 60);
+                 double support_friction, int max_pivots = 60, double force_share = 1);
 
 /// The motion with every frame moved and turned about its COM.
 Motion shifted(const Motion& motion, const Shift& shift, const physics::Body& body);

@@ -4,6 +4,7 @@
 
 #include "physics/element_body.h"
 #include "physics/element_calibration.h"
+#include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/loop.h"
 
@@ -175,7 +176,9 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   if (both.travel.norm() > kOwnTravel * creature.length && was_made_to_be_played_once(clip, mass, kFlight * creature.size)) both = clip;
   Motion skin_points = both;
   skin_points.frames = both.frames.bottomRows(3 * points);
-  const RootMotionResult root = recover_root_motion(skin_points, creature.length, options.root_motion);
+  Motion com = both;
+  com.frames = com_path(both, mass);
+  const RootMotionResult root = recover_root_motion(skin_points, com, creature.length, options.root_motion);
   result.root_motion = root.recovered ? kFromFeet : options.root_motion == RootMotion::kNone ? "none" : "clip";
   const Motion loop = both;
   for (Eigen::Index f = 0; f < both.count(); ++f) {

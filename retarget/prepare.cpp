@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 
 #include "retarget/balance.h"
+#include "retarget/needed_strain.h"
 #include "retarget/shape_projection.h"
 #include "retarget/smooth.h"
 
@@ -14,6 +16,9 @@ namespace {
 
 constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
+constexpr double kFar = 0.04;         // of L: further no shift should move a clip
+constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
+constexpr double kLeapForces = 0.1;   // share of the forces' cost for a leap that would be moved further
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
 
 double rms_difference(const Motion& a, const Motion& b, const Eigen::VectorXd& mass) {
@@ -41,6 +46,15 @@ ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, co
   std::size_t chosen = 0;
   while (badness[chosen] > std::max(kGoodBalance, kWorseBalance * least)) ++chosen;
   return schedules[chosen];
+}
+
+/// A leap launches and lands by force: where loads that come and go gently would move it too far, they cost less.
+double force_share(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
+                   double support_friction) {
+  if (contacts.flight_s(target.rate_hz) < kLeap) return 1;
+  const Shift shift = find_shift(target, scene, contacts, length, support_friction);
+  const double far = std::sqrt(shift.move.squaredNorm() / static_cast<double>(shift.move.cols()));
+  return far > kFar * length ? kLeapForces : 1;
 }
 
 /// The foot lock: the mean offset of each patch to its holds moves its bone's nodes and fades out over the frames around the contact.
@@ -96,6 +110,19 @@ void measure(const PreparedTarget& prepared, const physics::Body& body, Preparat
   report.volume_error_rms = std::sqrt(squared / static_cast<double>(prepared.target.count()));
 }
 
+/// The strain to which the shape is held: none where the clip keeps within reach. Adds a warning where it does not.
+double reach_of(const Motion& motion, const physics::Body& body, double reach, std::vector<std::string>& warnings) {
+  const double need = needed_strain(body, motion);
+  if (need <= reach) return std::numeric_limits<double>::infinity();
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "the clip stretches and squeezes constraints by %.0f %%, the body reaches %.0f %%: its shape is held back to that; "
+                "a higher --limit or more --nodes bring it nearer",
+                100 * need, 100 * reach);
+  warnings.push_back(text);
+  return reach;
+}
+
 void lower_by(double ground, Motion& motion) {
   for (Eigen::Index r = 1; r < motion.frames.rows(); r += 3) motion.frames.row(r).array() -= ground;
 }
@@ -124,15 +151,16 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   const Motion locked = lock_feet(grounded, scene, contacts, holds, floor, bone_names, node_bone_weights, options.smooth_hz);
   report.foot_shift_rms_length = rms_difference(locked, grounded, body.mass) / length;
 
-  ShapeProjector projector(scene, length, options.volume);
+  ShapeProjector projector(scene, length, options.volume, reach_of(locked, body, options.reach, result.warnings));
   target = project_frames(locked, holds, floor, projector, options.smooth_hz);
   report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
   const auto remark = [&] { mark_touching(point_motion(scene.contact_points, target), kTouching * size, contacts); };
   remark();
   const Motion before_momentum = target;
   Motion wanted = locked;  // the animator's shape with the shifts so far
+  const double share = options.momentum ? force_share(target, scene, contacts, length, options.support_friction) : 1;
   for (int round = 0; options.momentum && round < options.rounds; ++round) {
-    const Shift shift = find_shift(target, scene, contacts, length, options.support_friction);
+    const Shift shift = find_shift(target, scene, contacts, length, options.support_friction, 60, share);
     wanted = shifted(wanted, shift, body);
     target = project_frames(wanted, holds, floor, projector, options.smooth_hz);
     fall_freely(contacts, scene, target);

@@ -1,5 +1,7 @@
 #include "retarget/root_motion.h"
 
+#include "retarget/leap_pace.h"
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -11,9 +13,18 @@ namespace {
 constexpr int kHarmonics = 2;        // of the pace in a period: one for the stride, one for its steps
 constexpr double kEvenness = 0.003;  // weight of an even pace against one frame on the ground
 
+/// How far a frame is on the ground by the height of its lowest point [m], 1 to 0; `soft` [m] counts half.
+Eigen::VectorXd bearing_of(const Eigen::VectorXd& heights, double soft) {
+  std::vector<double> sorted(heights.data(), heights.data() + heights.size());
+  const Eigen::Index fifth = heights.size() / 5;
+  std::nth_element(sorted.begin(), sorted.begin() + fifth, sorted.end());
+  const Eigen::ArrayXd above = (heights.array() - sorted[static_cast<std::size_t>(fifth)]).max(0) / soft;
+  return (1 + above.square()).inverse();
+}
+
 /// The course of a loop's pace, 2 x F [m/s]: the mean and the first harmonics that fit best where something is near the ground.
-/// What remains is the feet's own sliding, which the foot lock takes. `soft` [m] is the height that counts half as ground.
-Eigen::MatrixXd smooth_pace(const Eigen::MatrixXd& ground, const Eigen::VectorXd& heights, double soft) {
+/// What remains is the feet's own sliding, which the foot lock takes. `weights` F say how much of each frame is on the ground.
+Eigen::MatrixXd smooth_pace(const Eigen::MatrixXd& ground, const Eigen::VectorXd& weights) {
   const Eigen::Index frames = ground.cols();
   Eigen::MatrixXd basis(frames, 1 + 2 * kHarmonics);
   for (Eigen::Index f = 0; f < frames; ++f) {
@@ -24,10 +35,6 @@ Eigen::MatrixXd smooth_pace(const Eigen::MatrixXd& ground, const Eigen::VectorXd
       basis(f, 2 * k) = std::sin(phase);
     }
   }
-  std::vector<double> sorted(heights.data(), heights.data() + frames);
-  std::nth_element(sorted.begin(), sorted.begin() + frames / 5, sorted.end());
-  const Eigen::ArrayXd above = (heights.array() - sorted[static_cast<std::size_t>(frames / 5)]).max(0) / soft;
-  const Eigen::VectorXd weights = (1 + above.square()).inverse();
   Eigen::MatrixXd normal = basis.transpose() * weights.asDiagonal() * basis;
   for (int k = 1; k <= kHarmonics; ++k) {
     normal(2 * k - 1, 2 * k - 1) += kEvenness * k * k * static_cast<double>(frames);
@@ -39,7 +46,7 @@ Eigen::MatrixXd smooth_pace(const Eigen::MatrixXd& ground, const Eigen::VectorXd
 
 }  // namespace
 
-RootMotionResult recover_root_motion(const Motion& points, double length, RootMotion mode) {
+RootMotionResult recover_root_motion(const Motion& points, const Motion& com, double length, RootMotion mode) {
   const Eigen::Index frames = points.count(), count = points.frames.rows() / 3;
   RootMotionResult result;
   result.offset = Eigen::MatrixXd::Zero(3, frames);
@@ -75,10 +82,12 @@ RootMotionResult recover_root_motion(const Motion& points, double length, RootMo
     ground.col(f) = sum / weights;
     heights[f] = lowest;
   }
-  const double period = points.duration_s();
+  const Eigen::VectorXd bearing = bearing_of(heights, soft);
+  const bool leaps = points.loop && leaves_the_ground(bearing);
+  if (leaps) ground = leaping_pace(ground, bearing, com, length);
   const Eigen::Vector2d mean = ground.rowwise().mean();
-  if (mode == RootMotion::kAuto && mean.norm() * period < 0.1 * length) return result;
-  if (points.loop) ground = smooth_pace(ground, heights, soft);
+  if (mode == RootMotion::kAuto && mean.norm() * points.duration_s() < 0.1 * length) return result;
+  if (points.loop && !leaps) ground = smooth_pace(ground, bearing);
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
   for (Eigen::Index f = 0; f < frames; ++f) {
     result.offset.col(f) = place;

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <cstdio>
 
+#include "retarget/needed_strain.h"
+
 namespace hydrostat::retarget {
 namespace {
 
 constexpr double kMissingWrench = 0.05;  // [m g] from which it is told
 constexpr double kOverLimit = 1.5;       // of the limit
-constexpr double kNeedShare = 0.99;      // of a clip's strains that the limit should hold
 constexpr double kSaturated = 0.05;      // share of the activations
 constexpr double kMiss = 3e-4;           // per L
 constexpr double kRootResidual = 0.01;   // [m g]
@@ -28,20 +29,6 @@ std::string patches_in_contact(const ContactSchedule& contacts, std::size_t fram
     names += (names.empty() ? "'" : ", '") + contacts.patches[k].name + "'";
   }
   return names.empty() ? "in flight" : "standing on " + names;
-}
-
-/// The strain below which `kNeedShare` of all constraints and frames stay [-].
-double needed_strain(const physics::Body& body, const Motion& target) {
-  std::vector<double> strains;
-  for (Eigen::Index f = 0; f < target.count(); ++f) {
-    const auto x = target.at(f);
-    for (int e = 0; e < body.edge_count(); ++e) {
-      strains.push_back(std::abs((x.col(body.edges(1, e)) - x.col(body.edges(0, e))).norm() / body.rest_length[e] - 1));
-    }
-  }
-  const auto place = strains.begin() + static_cast<long>(kNeedShare * static_cast<double>(strains.size() - 1));
-  std::nth_element(strains.begin(), place, strains.end());
-  return *place;
 }
 
 }  // namespace

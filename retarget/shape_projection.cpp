@@ -10,6 +10,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kEdgeShare = 0.02;   // of the springs, at rest in the animator's shape, that keeps the volume step from folding
+constexpr double kReachShare = 0.1;   // where the animator's shape is beyond reach, that holds it back
 constexpr double kTether = 40;        // of g / L [1/s2]: pull back to the animator's shape
 constexpr double kHold = 1000;        // a contact's pull over a node's tether
 
@@ -88,9 +89,8 @@ Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double cleara
   return floor;
 }
 
-ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume)
-    : scene_(scene), body_(scene.body), matrix_(scene.body) {
-  body_.edge_stiffness *= kEdgeShare;
+ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume, double reach)
+    : scene_(scene), body_(scene.body), matrix_(scene.body), reach_(reach) {
   if (!keep_volume) body_.volume_stiffness.setZero();
   tether_ = kTether * scene.gravity.norm() / length;
   // Light limbs are held to their shape as firmly as the trunk.
@@ -101,7 +101,9 @@ ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool 
 Eigen::Matrix3Xd ShapeProjector::project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor) {
   shape_.resize(body_.edge_count());
   for (int e = 0; e < body_.edge_count(); ++e) {
-    shape_[e] = (target.col(body_.edges(1, e)) - target.col(body_.edges(0, e))).norm() / body_.rest_length[e];
+    const double wanted = (target.col(body_.edges(1, e)) - target.col(body_.edges(0, e))).norm() / body_.rest_length[e];
+    shape_[e] = std::clamp(wanted, 1 - reach_, 1 + reach_);
+    body_.edge_stiffness[e] = (shape_[e] == wanted ? kEdgeShare : kReachShare) * scene_.body.edge_stiffness[e];
   }
   Eigen::Matrix3Xd x = target;
   double energy = energy_of(x, target, holds, floor);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "physics/stepper.h"
@@ -23,11 +24,12 @@ std::vector<std::vector<Hold>> find_holds(const ContactSchedule& contacts, const
 Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double clearance, int fade);
 
 /// The nearest shape (tether by mean mass) of unit volume ratio in every tet that keeps the holds and stays above the ground.
-/// Newton on tether + volume + a little of the springs.
+/// Newton on tether + volume + a little of the springs. Constraints that the target strains beyond `reach` [-] are held back to it.
 class ShapeProjector {
  public:
   /// length [m] is L. The scene must outlive the projector.
-  ShapeProjector(const physics::Scene& scene, double length, bool keep_volume);
+  ShapeProjector(const physics::Scene& scene, double length, bool keep_volume,
+                 double reach = std::numeric_limits<double>::infinity());
 
   /// `floor` [m]: the least height of each contact point.
   Eigen::Matrix3Xd project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor);
@@ -44,8 +46,8 @@ class ShapeProjector {
   const physics::Scene& scene_;
   physics::Body body_;
   physics::SystemMatrix matrix_;
-  Eigen::VectorXd shape_;  // activation for which the animator's shape has no stress
-  double tether_ = 0, hold_ = 0;
+  Eigen::VectorXd shape_;  // activation for which the animator's shape, as far as it is within reach, has no stress
+  double reach_, tether_ = 0, hold_ = 0;
 };
 
 /// Projects all frames, twice with what the projection changed smoothed over time at `smooth_hz`, then once more so that contacts

@@ -1,5 +1,6 @@
 #include "retarget/prepare.h"
 
+#include "retarget/needed_strain.h"
 #include "retarget/smooth.h"
 
 #include <gtest/gtest.h>
@@ -137,6 +138,28 @@ TEST(Prepare, FliesAsGravityWantsIt) {
   }
   EXPECT_GT(flying, 8);
   EXPECT_NEAR(target.report.flight_s, flying / 60.0, 1e-12);
+}
+
+TEST(Prepare, HoldsAShapeBackThatIsOutOfReach) {
+  const BoxCreature creature = make_box_creature();
+  // Stretched along x to `stretch` in the midst of the clip.
+  const auto stretched = [&](double stretch) {
+    return played(creature, 30, true, [stretch](const Eigen::Vector3d& x, Eigen::Index f) {
+      const double grown = 1 + (stretch - 1) * std::pow(std::sin(M_PI * static_cast<double>(f) / 30), 2);
+      return Eigen::Vector3d(x.x() * grown, x.y(), x.z());
+    });
+  };
+  PrepareOptions endless;
+  endless.reach = 10;
+  const auto& body = creature.scene.body;
+  const PreparedTarget held = prepared(creature, stretched(2)), free = prepared(creature, stretched(2), endless);
+  EXPECT_GT(needed_strain(body, free.target), 0.7);
+  EXPECT_LT(needed_strain(body, held.target), 0.5);
+  ASSERT_EQ(held.warnings.size(), 1u);
+  EXPECT_NE(held.warnings[0].find("the body reaches 40 %"), std::string::npos) << held.warnings[0];
+  EXPECT_TRUE(free.warnings.empty());
+  // What is within reach stays as it is.
+  EXPECT_EQ(prepared(creature, stretched(1.2)).target.frames, prepared(creature, stretched(1.2), endless).target.frames);
 }
 
 TEST(Prepare, BalancesAHopThatNobodyCouldDo) {

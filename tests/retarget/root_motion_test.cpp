@@ -37,6 +37,14 @@ Motion walk(const Eigen::Vector3d& travel, double share) {
   return motion;
 }
 
+/// As if the mass were spread evenly over the points.
+RootMotionResult recovered(const Motion& motion, RootMotion mode) {
+  Motion com = motion;
+  com.frames.resize(3, motion.count());
+  for (Eigen::Index f = 0; f < motion.count(); ++f) com.frames.col(f) = motion.at(f).rowwise().mean();
+  return recover_root_motion(motion, com, 1, mode);
+}
+
 TEST(RecoverRootMotion, FindsTheSpeedOfATreadmill) {
   for (unsigned seed = 0; seed < 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -44,7 +52,7 @@ TEST(RecoverRootMotion, FindsTheSpeedOfATreadmill) {
     std::uniform_real_distribution<double> uniform(0, 1);
     const double heading = 2 * M_PI * uniform(random), stride = 0.2 + 0.6 * uniform(random);
     const Eigen::Vector3d travel(stride * std::cos(heading), 0, stride * std::sin(heading));
-    const RootMotionResult result = recover_root_motion(walk(travel, 0), 1, RootMotion::kAuto);
+    const RootMotionResult result = recovered(walk(travel, 0), RootMotion::kAuto);
     ASSERT_TRUE(result.recovered);
     EXPECT_LT((result.travel - travel).norm(), 0.04 * stride);
     // The pace is even, and every course starts where it stands.
@@ -71,7 +79,7 @@ TEST(RecoverRootMotion, FollowsAPaceThatChangesWithEachStep) {
     }
     motion.at(f).col(2) << 0, 1, 0;
   }
-  const RootMotionResult result = recover_root_motion(motion, 1, RootMotion::kFromFeet);
+  const RootMotionResult result = recovered(motion, RootMotion::kFromFeet);
   for (Eigen::Index f = 0; f < kFrames; ++f) {
     // What goes beyond an even pace: 0.016 m at most.
     const double phase = static_cast<double>(f) / kFrames;
@@ -80,9 +88,56 @@ TEST(RecoverRootMotion, FollowsAPaceThatChangesWithEachStep) {
   EXPECT_NEAR(result.travel.x(), 0.6, 0.06) << "where the feet change, swing and stance are one";
 }
 
+/// A hop in place: two feet of `stand` frames on the ground, then the body of mass 10 to theirs in the air with gravity's rise, in which
+/// the feet swing back and forth. Before launch and after landing the feet slide back under the body as it gathers and loses `speed` [m/s].
+Motion hop(double speed, Eigen::Index stand) {
+  Motion motion;
+  motion.loop = true;
+  motion.frames.resize(9, kFrames);
+  const double flight = static_cast<double>(kFrames - stand) / 60;
+  for (Eigen::Index f = 0; f < kFrames; ++f) {
+    const double t = static_cast<double>(f - stand) / 60, rise = f < stand ? 0 : 9.81 / 2 * t * (flight - t);
+    const double push = 6.0 / 60, since = static_cast<double>(f) / 60, left = -t;  // [s] of gathering speed
+    double behind = 0;
+    if (f < stand && since < push) behind = speed * (since - since * since / (2 * push)) - speed * push / 2;
+    if (f < stand && left < push) behind = speed * (push - left) * (push - left) / (2 * push);
+    if (f >= stand) behind = speed * push / 2 * std::cos(M_PI * t / flight) + 0.1 * std::pow(std::sin(M_PI * t / flight), 2);
+    for (int foot = 0; foot < 2; ++foot) motion.at(f).col(foot) << -behind, 0.9 * rise, 0.1 * foot;
+    motion.at(f).col(2) << 0, 0.4 + rise, 0.05;
+  }
+  return motion;
+}
+
+RootMotionResult recovered_hop(double speed, RootMotion mode) {
+  const Motion motion = hop(speed, 24);
+  Motion com = motion;
+  com.frames = motion.frames.bottomRows(3);
+  return recover_root_motion(motion, com, 1, mode);
+}
+
+TEST(RecoverRootMotion, AHopGoesOnEvenlyInTheAir) {
+  for (const double speed : {0.6, 1.0, 1.5}) {
+    SCOPED_TRACE("speed " + std::to_string(speed));
+    const RootMotionResult result = recovered_hop(speed, RootMotion::kAuto);
+    ASSERT_TRUE(result.recovered);
+    const Eigen::RowVectorXd pace = 60 * (result.offset.rightCols(kFrames - 1) - result.offset.leftCols(kFrames - 1)).row(0);
+    const Eigen::RowVectorXd air = pace.segment(26, 18), ground = pace.segment(8, 8);
+    EXPECT_GT(air.mean(), 0.3 * speed);
+    EXPECT_LT(air.mean(), 1.3 * speed);
+    EXPECT_LT(air.maxCoeff() - air.minCoeff(), 0.25 * speed);
+    EXPECT_LT(std::abs(ground.mean()), 0.25 * speed) << "feet that stand";
+    EXPECT_NEAR(result.travel.x(), (result.offset(0, kFrames - 1) + pace[kFrames - 2] / 60), 0.02 * speed);
+  }
+}
+
+TEST(RecoverRootMotion, AHopOnTheSpotStaysThere) {
+  EXPECT_FALSE(recovered_hop(0, RootMotion::kAuto).recovered);
+  EXPECT_LT(recovered_hop(0, RootMotion::kFromFeet).travel.norm(), 0.1);
+}
+
 TEST(RecoverRootMotion, LeavesATravellingClipAlone) {
   for (const RootMotion mode : {RootMotion::kAuto, RootMotion::kKeep}) {
-    const RootMotionResult result = recover_root_motion(walk({0.5, 0, 0.2}, 1), 1, mode);
+    const RootMotionResult result = recovered(walk({0.5, 0, 0.2}, 1), mode);
     EXPECT_FALSE(result.recovered);
     EXPECT_EQ(result.offset.norm(), 0);
     EXPECT_EQ(result.travel.norm(), 0);
@@ -90,24 +145,24 @@ TEST(RecoverRootMotion, LeavesATravellingClipAlone) {
 }
 
 TEST(RecoverRootMotion, LeavesAnIdleClipAlone) {
-  const RootMotionResult result = recover_root_motion(walk({0.01, 0, 0}, 0), 1, RootMotion::kAuto);
+  const RootMotionResult result = recovered(walk({0.01, 0, 0}, 0), RootMotion::kAuto);
   EXPECT_FALSE(result.recovered);
   EXPECT_EQ(result.offset.norm(), 0);
 }
 
 TEST(RecoverRootMotion, FromFeetAddsNextToNothingToATravellingClip) {
-  const RootMotionResult result = recover_root_motion(walk({0.5, 0, 0}, 1), 1, RootMotion::kFromFeet);
+  const RootMotionResult result = recovered(walk({0.5, 0, 0}, 1), RootMotion::kFromFeet);
   EXPECT_TRUE(result.recovered);
   EXPECT_LT(result.travel.norm(), 0.02);
 }
 
 TEST(RecoverRootMotion, KeepNeverMovesATreadmill) {
-  EXPECT_FALSE(recover_root_motion(walk({0.5, 0, 0}, 0), 1, RootMotion::kKeep).recovered);
+  EXPECT_FALSE(recovered(walk({0.5, 0, 0}, 0), RootMotion::kKeep).recovered);
 }
 
 TEST(RecoverRootMotion, NoneTakesTheTravelOfALoopAway) {
   const Motion motion = walk({0.5, 0, -0.2}, 1);
-  const RootMotionResult result = recover_root_motion(motion, 1, RootMotion::kNone);
+  const RootMotionResult result = recovered(motion, RootMotion::kNone);
   EXPECT_LT((motion.travel + result.travel).norm(), 1e-15);
   for (Eigen::Index f = 0; f < kFrames; ++f) {  // the trunk stands
     EXPECT_LT((motion.at(f).col(4) + result.offset.col(f) - motion.at(0).col(4)).norm(), 1e-12);
@@ -118,7 +173,7 @@ TEST(RecoverRootMotion, NoneTakesTheTravelOfAOneShotAway) {
   Motion motion = walk({0.5, 0, -0.2}, 1);
   motion.loop = false;
   motion.travel.setZero();
-  const RootMotionResult result = recover_root_motion(motion, 1, RootMotion::kNone);
+  const RootMotionResult result = recovered(motion, RootMotion::kNone);
   EXPECT_EQ(result.travel.norm(), 0);
   const Eigen::Index last = kFrames - 1;
   const Eigen::Vector3d gone = (motion.at(last).rowwise().mean() + result.offset.col(last)) - motion.at(0).rowwise().mean();

@@ -118,7 +118,7 @@ double reach_of(const Motion& motion, const physics::Body& body, double reach, s
   char text[200];
   std::snprintf(text, sizeof text,
                 "the clip stretches and squeezes constraints by %.0f %%, the body reaches %.0f %%: its shape is held back to that; "
-                "a higher --limit or more --nodes bring it nearer",
+                "a clip that stretches less stays as it is",
                 100 * need, 100 * reach);
   warnings.push_back(text);
   return reach;

@@ -11,13 +11,17 @@ namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kInTheAir = 0.1;      // bearing below which nothing is down
+constexpr double kFalls = 0.5;         // of gravity
 constexpr double kSmoothHz = 10;       // of the centre of mass, as preparation smooths it
 constexpr double kPush = 0.2;          // per g of sideways acceleration at full load, against sliding by sqrt(g L)
 constexpr double kLeastLoad = 0.2;     // of the weight: what the air counts as
 
 }  // namespace
 
-bool leaves_the_ground(const Eigen::VectorXd& bearing) { return bearing.minCoeff() < kInTheAir; }
+bool leaps(const Eigen::VectorXd& bearing, const Motion& com) {
+  const Eigen::RowVectorXd up = accelerations(smooth(com, kSmoothHz)).row(1);
+  return ((bearing.transpose().array() < kInTheAir) && (up.array() < -kFalls * kGravity)).any();
+}
 
 Eigen::MatrixXd leaping_pace(const Eigen::MatrixXd& ground, const Eigen::VectorXd& bearing, const Motion& com, double length) {
   const Eigen::Index frames = ground.cols();

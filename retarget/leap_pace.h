@@ -4,8 +4,9 @@
 
 namespace hydrostat::retarget {
 
-/// Whether a loop leaves the ground: `bearing` F, 1 on the ground to 0 far above it.
-bool leaves_the_ground(const Eigen::VectorXd& bearing);
+/// Whether a loop leaps: its centre of mass `com` falls, by half of gravity or more, while nothing is near the ground. `bearing` F is 1 on
+/// the ground, 0 far above it.
+bool leaps(const Eigen::VectorXd& bearing, const Motion& com);
 
 /// The pace, 2 x F [m/s, x and z], of a loop in place that leaves the ground, as the speed of the ground under it: feet slide little while
 /// something is down, and the centre of mass is pushed sideways only as far as the load allows, in the air not at all. `ground` 2 x F

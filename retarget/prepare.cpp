@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
+constexpr double kOverReach = 1.5;    // times reach: what a clip needs beyond that is held back
 constexpr double kFar = 0.04;         // of L: further no shift should move a clip
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
 constexpr double kLeapForces = 0.1;   // share of the forces' cost for a leap that would be moved further
@@ -110,14 +111,14 @@ void measure(const PreparedTarget& prepared, const physics::Body& body, Preparat
   report.volume_error_rms = std::sqrt(squared / static_cast<double>(prepared.target.count()));
 }
 
-/// The strain to which the shape is held: none where the clip keeps within reach. Adds a warning where it does not.
+/// The strain to which the shape is held: none where the clip needs little more than reach. Adds a warning where it needs more.
 double reach_of(const Motion& motion, const physics::Body& body, double reach, std::vector<std::string>& warnings) {
   const double need = needed_strain(body, motion);
-  if (need <= reach) return std::numeric_limits<double>::infinity();
+  if (need <= kOverReach * reach) return std::numeric_limits<double>::infinity();
   char text[200];
   std::snprintf(text, sizeof text,
                 "the clip stretches and squeezes constraints by %.0f %%, the body reaches %.0f %%: its shape is held back to that; "
-                "a higher --limit or more --nodes bring it nearer",
+                "a clip that stretches less stays as it is",
                 100 * need, 100 * reach);
   warnings.push_back(text);
   return reach;

@@ -1,11 +1,11 @@
 #include "retarget/root_motion.h"
 
-#include "retarget/leap_pace.h"
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "retarget/leap_pace.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -83,11 +83,11 @@ RootMotionResult recover_root_motion(const Motion& points, const Motion& com, do
     heights[f] = lowest;
   }
   const Eigen::VectorXd bearing = bearing_of(heights, soft);
-  const bool leaps = points.loop && leaves_the_ground(bearing);
-  if (leaps) ground = leaping_pace(ground, bearing, com, length);
+  const bool leaping = points.loop && leaps(bearing, com);
+  if (leaping) ground = leaping_pace(ground, bearing, com, length);
   const Eigen::Vector2d mean = ground.rowwise().mean();
   if (mode == RootMotion::kAuto && mean.norm() * points.duration_s() < 0.1 * length) return result;
-  if (points.loop && !leaps) ground = smooth_pace(ground, bearing);
+  if (points.loop && !leaping) ground = smooth_pace(ground, bearing);
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
   for (Eigen::Index f = 0; f < frames; ++f) {
     result.offset.col(f) = place;

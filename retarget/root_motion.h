@@ -13,7 +13,8 @@ struct RootMotionResult {
 };
 
 /// The travel that an in-place clip has lost, from the backward sliding of what stands on the ground: the offset that makes
-/// the lowest points stand still, of a loop as far as an even pace and its first two harmonics do. kAuto recovers where a loop
+/// the lowest points stand still, of a loop as far as an even pace and its first two harmonics do; a loop that leaps goes on evenly in the air, see leap_pace.h.
+/// `com` is the centre of mass, 3 x F. kAuto recovers where a loop
 /// travels less than 5 % of `length` [m] while its low points slide further than 10 % in a period; kFromFeet always, kKeep never, kNone takes the clip's own travel away.
 RootMotionResult recover_root_motion(const Motion& points, const Motion& com, double length, RootMotion mode);
 

@@ -16,12 +16,12 @@ constexpr double kRunaway = 100;    // of the body's size [-]: what moves as far
 /// Extended position-based dynamics in small substeps of one Gauss-Seidel pass each: stable at every stiffness, softer than
 /// the material where its waves cross elements faster than substeps come.
 ///
-/// Constraints are the springs with their dashpots, the volumes and the elements (C = sqrt(2 U) with compliance 1), in the
-/// order of a colouring: two of a colour share no node. Linear momentum changes by the booked impulses alone, to rounding.
+/// Constraints are the springs, the volumes and the elements (C = sqrt(2 U) with compliance 1), in the order of a colouring: two of
+/// a colour share no node. Dashpots come after the pass, see damp. Linear momentum changes by the booked impulses alone, to rounding.
 /// Angular momentum does not: each correction has no moment where it is made, but the places move on before the velocities
 /// are taken; what is lost is the method's own and no booked moment covers it. Contact is by impulses on the velocity that
 /// moves the body, after the pass.
-/// Source: Macklin, Müller, Chentanez, "XPBD", MIG 2016, eq. (18) and (26); Macklin et al., "Small steps in physics
+/// Source: Macklin, Müller, Chentanez, "XPBD", MIG 2016, eq. (18); Macklin et al., "Small steps in physics
 /// simulation", SCA 2019, algorithm 1.
 template <int Dim>
 class XpbdStepper final : public StepperOf<Dim> {
@@ -67,6 +67,8 @@ class XpbdStepper final : public StepperOf<Dim> {
       state.x += h * state.v;
       for (const Constraint& constraint : constraints_) project(constraint, h, activation, state.x);
       state.v = (state.x - from_) / h;
+      for (auto e = dashpots_.begin(); e != dashpots_.end(); ++e) damp(*e, 0.5 * h, state);
+      for (auto e = dashpots_.rbegin(); e != dashpots_.rend(); ++e) damp(*e, 0.5 * h, state);
       state.x = from_;
       double fastest = 0;
       for (int i = 0; i < body.node_count(); ++i) {
@@ -117,7 +119,8 @@ class XpbdStepper final : public StepperOf<Dim> {
     }
     for (int t = 0; t < body.volume_stiffness.size(); ++t) constraints_.push_back({Kind::kVolume, 0, t});
     for (int e = 0; e < body.edge_count(); ++e) {
-      if (body.edge_stiffness[e] != 0 || body.edge_damping[e] != 0) constraints_.push_back({Kind::kEdge, 0, e});
+      if (body.edge_stiffness[e] != 0) constraints_.push_back({Kind::kEdge, 0, e});
+      if (body.edge_damping[e] != 0) dashpots_.push_back(e);
     }
     std::vector<std::vector<char>> seen(static_cast<std::size_t>(body.node_count()));
     std::vector<std::vector<Constraint>> colours;
@@ -176,7 +179,25 @@ class XpbdStepper final : public StepperOf<Dim> {
     if (held_impulse_.size() > 0) held_impulse_.col(node) += push / h;
   }
 
-  /// Equation (26) times the stiffness, so that a dashpot without a spring is one, too.
+  /// A dashpot on the velocities, as backward Euler has it. A pass over them is a product of contractions, whose eigenvalues may lie
+  /// anywhere in the unit circle where they are stiff; what it leaves of the springs' push then turns against them, and feeds the
+  /// body. There and back, with half the time each, the product is symmetric, its eigenvalues lie in [0, 1], and it never does.
+  void damp(int e, double h, StateOf<Dim>& state) {
+    const BodyOf<Dim>& body = scene_.body;
+    const int i = body.edges(0, e), j = body.edges(1, e);
+    const VectorOf<Dim> span = state.x.col(j) - state.x.col(i);
+    const double length = span.norm();
+    if (length == 0) return;  // no direction
+    const VectorOf<Dim> n = span / length;
+    const double damping = body.edge_damping[e] * h, mobility = inverse_mass_[i] + inverse_mass_[j];
+    const VectorOf<Dim> impulse = (damping * n.dot(state.v.col(j) - state.v.col(i)) / (1 + damping * mobility)) * n;
+    state.v.col(i) += inverse_mass_[i] * impulse;
+    state.v.col(j) -= inverse_mass_[j] * impulse;
+    if (held_impulse_.size() == 0) return;
+    held_impulse_.col(i) += impulse;
+    held_impulse_.col(j) -= impulse;
+  }
+
   void project_edge(int e, double h, const Eigen::VectorXd& activation, PointsOf<Dim>& x) {
     const BodyOf<Dim>& body = scene_.body;
     const int i = body.edges(0, e), j = body.edges(1, e);
@@ -185,9 +206,7 @@ class XpbdStepper final : public StepperOf<Dim> {
     if (length == 0) return;  // no direction
     const VectorOf<Dim> n = span / length;
     const double stretch = length - activation[e] * body.rest_length[e], stiffness = body.edge_stiffness[e] * h * h;
-    const double moved = n.dot(span - (from_.col(j) - from_.col(i))), damping = body.edge_damping[e] * h;
-    const double mobility = inverse_mass_[i] + inverse_mass_[j];
-    const double pull = (stiffness * stretch + damping * moved) / (1 + (stiffness + damping) * mobility);
+    const double pull = stiffness * stretch / (1 + stiffness * (inverse_mass_[i] + inverse_mass_[j]));
     move(i, pull * n, h, x);
     move(j, -pull * n, h, x);
   }
@@ -224,6 +243,7 @@ class XpbdStepper final : public StepperOf<Dim> {
   ImpulseContact<Dim> contact_;
   std::vector<ActiveStrain<Dim>> active_;
   std::vector<Constraint> constraints_;
+  std::vector<int> dashpots_;  // edges
   ElementConstraint<Dim> element_;
   PointsOf<Dim> held_impulse_;  // [N s] by the constraints on held nodes in this step; empty where none is held
   double substep_ = 0;          // [s] the longest

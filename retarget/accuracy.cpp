@@ -100,6 +100,14 @@ double own_step(const physics::SceneOf<Dim>& scene, double frame_s) {
   return physics::make_explicit_stepper<Dim>(scene)->substep(frame_s);
 }
 
+/// Whether self-contact changed a motion.
+template <int Dim>
+bool touches_itself(ScenarioOf<Dim> scenario, const SimulationOptions& path, const Simulation& run) {
+  if (!scenario.scene.self_contact.is_on) return false;
+  scenario.scene.self_contact.is_on = false;
+  return simulate(scenario, path).motion.frames != run.motion.frames;
+}
+
 /// Windows along the motion by a setting.
 template <int Dim>
 std::vector<WindowOf<Dim>> windows_along(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options,
@@ -117,7 +125,7 @@ std::vector<WindowOf<Dim>> windows_along(const ScenarioOf<Dim>& scenario, const 
   SimulationOptions path = options_for(all, setting, options.frame_s);
   path.velocities = true;
   const Simulation run = simulate(scenario, path);
-  if (!scenario.scene.self_contact.is_on && run.course.contact_weights.maxCoeff() == 0) return {all};
+  if (run.course.contact_weights.maxCoeff() == 0 && !touches_itself(scenario, path, run)) return {all};
   const auto frames = std::max(static_cast<double>(kLeastFrames), std::round(options.window_s / options.frame_s));
   const double last = std::max(0.0, static_cast<double>(run.motion.count() - 1) - frames);
   std::vector<WindowOf<Dim>> windows;

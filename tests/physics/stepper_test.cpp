@@ -256,6 +256,26 @@ METHOD_TEST(Steppers, GainNoEnergyFromDashpotsThatAreStifferThanTheBody) {
   }
 }
 
+TEST(Xpbd, IsNotFedByDashpotsThatStopABodyWithinASubstep) {
+  for (const double damping_time : {0.003, 0.01, 0.1}) {
+    BodyOf<3> body = bar<3>(8, 2, 2, 0.125);
+    body.edge_stiffness *= 50;
+    body.volume_stiffness *= 50;
+    body.edge_damping = damping_time * body.edge_stiffness;
+    SceneOf<3> scene = scene_of(body, {});
+    scene.has_ground = false;
+    for (unsigned seed = 1; seed <= trials(3U); ++seed) {
+      std::mt19937 random(seed);
+      const StateOf<3> start{body.rest + random_points<3>(random, body.node_count(), 0.01), random_points<3>(random, body.node_count(), 1)};
+      double highest = 0;
+      run<3>(Method::kXpbd, scene, start, 120, [&](const StateOf<3>&, const StateOf<3>& after, const ImpulsesOf<3>&) {
+        highest = std::max(highest, energy(scene, after, passive(body)));
+      });
+      EXPECT_LT(highest, 1.01 * energy(scene, start, passive(body))) << damping_time << " s, seed " << seed;
+    }
+  }
+}
+
 METHOD_TEST(Steppers, LiftAPointThatStartsBelowTheGroundWithoutThrowingIt) {
   const BodyOf<Dim> body = bar<Dim>(3, 2, 3, 0.1);
   const SceneOf<Dim> scene = scene_of(body, soles(body));

@@ -22,11 +22,13 @@ constexpr double kFinestSeconds = kControlSeconds / 8;  // of the closed loop th
 constexpr double kRough = 0.03;
 constexpr double kRoughFinestSeconds = kControlSeconds / 2;
 
-/// Share of the work of the most accurate row that a choice saves; 0 where nothing was chosen.
-double work_saved(const std::vector<retarget::AccuracyRow>& rows, int choice) {
-  const int finest = retarget::most_accurate(rows);
-  if (choice < 0 || finest < 0) return 0;
-  return 1 - rows[static_cast<std::size_t>(choice)].work_ms / rows[static_cast<std::size_t>(finest)].work_ms;
+/// What a choice costs beside the most accurate row; nothing where nothing was chosen.
+void tell_saved(const std::vector<retarget::AccuracyRow>& rows, int choice, int finest, retarget::AccuracyReport& report) {
+  if (choice < 0 || finest < 0) return;
+  const retarget::AccuracyRow &row = rows[static_cast<std::size_t>(choice)], &most = rows[static_cast<std::size_t>(finest)];
+  report.work_saved = 1 - row.work_ms / most.work_ms;
+  report.ms_per_sim_s = row.ms_per_sim_s;
+  report.finest_ms_per_sim_s = most.ms_per_sim_s;
 }
 
 /// The rows within an error, least work first.
@@ -66,7 +68,6 @@ void take_candidate(ChosenStep& chosen, const retarget::Performer& performer, co
   const double floor_m = chosen.reference->uncertainty_m();
   const double most_m = chosen.report.max_error_length * performer.length - floor_m;
   const std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
-  const retarget::AccuracyRow& finest = rows[static_cast<std::size_t>(chosen.candidates.back())];
   for (;; ++chosen.candidate) {
     chosen.curve.recommended = chosen.candidates[chosen.candidate];
     const retarget::AccuracyRow& row = rows[static_cast<std::size_t>(chosen.curve.recommended)];
@@ -75,7 +76,7 @@ void take_candidate(ChosenStep& chosen, const retarget::Performer& performer, co
     const bool is_last = chosen.candidate + 1 == chosen.candidates.size();
     if (!is_last) error_m = std::max(error_m, closed_loop_error(*chosen.finest, performer, signals, chosen.setting));
     chosen.report.estimated_error_length = (error_m + floor_m) / performer.length;
-    chosen.report.work_saved = 1 - row.work_ms / finest.work_ms;
+    tell_saved(rows, chosen.curve.recommended, chosen.candidates.back(), chosen.report);
     if (is_last || error_m <= most_m) return;
   }
 }
@@ -111,7 +112,7 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
       choice.is_met ? retarget::cheapest_within(choice.tried, most * length - reference.uncertainty_m()) : -1;
   chosen.curve.max_error = most;
   chosen.curve.floor = floor;
-  chosen.report.work_saved = work_saved(choice.tried, chosen.curve.recommended);
+  tell_saved(choice.tried, chosen.curve.recommended, retarget::most_accurate(choice.tried), chosen.report);
   return chosen;
 }
 
@@ -194,6 +195,16 @@ retarget::AccuracyReport told(const ChosenStep& chosen) {
 void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve) {
   writer.write("accuracy.csv", io::accuracy_csv(curve));
   writer.write("accuracy.svg", io::accuracy_svg(curve));
+}
+
+std::string saved_words(const retarget::AccuracyReport& report) {
+  if (report.finest_ms_per_sim_s == 0) return {};
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "accuracy: %.3g %% of L by '%s' in steps of %.3g s, %.3g ms of the processor for a simulated second; the most accurate that was "
+                "tried takes %.3g ms\n",
+                100 * report.estimated_error_length, report.method.c_str(), report.dt_s, report.ms_per_sim_s, report.finest_ms_per_sim_s);
+  return text;
 }
 
 std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report) {

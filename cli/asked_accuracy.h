@@ -59,6 +59,9 @@ void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve);
 /// tried join the curve.
 void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, retarget::SignalSet& signals);
 
+/// The line that tells what a choice costs and saves; empty where nothing was chosen.
+std::string saved_words(const retarget::AccuracyReport& report);
+
 /// The line that tells of an error above what was asked for.
 std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report);
 

@@ -43,6 +43,7 @@ int convert(const ConvertOptions& options) {
   const int exit_code =
       options.json ? tell_report(run, options.out, motion_file, conversion.report()) : tell_run(run, options.out, motion_file);
   const retarget::AccuracyReport& accuracy = conversion.report().accuracy;
+  if (!options.json) std::cout << saved_words(accuracy);
   if (exit_code != kDone || accuracy.is_met()) return exit_code;
   std::cerr << too_inaccurate(options.clip_file, accuracy) << std::endl;
   return kShortOfTarget;

@@ -269,6 +269,7 @@ int replay(const ReplayCommand& command) {
   const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();
   const int exit_code =
       command.json ? tell_report(run, command.directory, motion_file, report) : tell_run(run, command.directory, motion_file);
+  if (!command.json) std::cout << saved_words(report.accuracy);
   if (is_met || exit_code != kDone) return exit_code;
   std::cerr << too_inaccurate(command.directory, report.accuracy) << std::endl;
   return kShortOfTarget;

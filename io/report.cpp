@@ -194,9 +194,13 @@ void fill(Group& group, const retarget::AccuracyReport& accuracy) {
   if (accuracy.max_error_length > 0) {
     group.add("max_error_length", accuracy.max_error_length);
     group.add("work_saved", accuracy.work_saved);
+    group.add("ms_per_sim_s", accuracy.ms_per_sim_s);
+    group.add("finest_ms_per_sim_s", accuracy.finest_ms_per_sim_s);
   } else {
     group.add_nothing("max_error_length");
     group.add_nothing("work_saved");
+    group.add_nothing("ms_per_sim_s");
+    group.add_nothing("finest_ms_per_sim_s");
   }
 }
 

@@ -6,7 +6,6 @@
 
 #include "retarget/cpu_seconds.h"
 #include "retarget/fall.h"
-#include "retarget/feet.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
@@ -64,7 +63,6 @@ class Run {
   const long steps_, steps_per_frame_;
   const Eigen::VectorXd mass_shares_;
   const MotionCurve curve_;
-  const std::vector<Patch> feet_;
   const std::unique_ptr<physics::Stepper> stepper_;
   Corrector corrector_;
   Observer observer_;
@@ -100,7 +98,6 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       steps_per_frame_(std::max(1L, std::lround(1 / (target_.rate_hz * control_s_)))),
       mass_shares_(input.scene.body.mass / input.scene.body.mass.sum()),
       curve_(target_),
-      feet_(feet_of(input.prepared.contacts, input.scene.contact_points)),
       stepper_(physics::make_stepper(options.method, input.scene)),
       corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
       observer_(options.observation, control_s_),
@@ -140,14 +137,16 @@ void Run::look_at_contacts() {
     const std::vector<ContactState>& planned = plan.state[k];
     if (planned[now] == ContactState::kSlide) contact_.grip = 0;
     const bool bears = planned[now] != ContactState::kOff && planned[then] != ContactState::kOff;
-    for (const int p : plan.patches[k].points) contact_.bearing[static_cast<std::size_t>(p)] = bears;
-  }
-  for (const Patch& foot : feet_) {
-    const auto touches = [&](int p) { return contact_.touching[static_cast<std::size_t>(p)] != ContactState::kOff; };
-    if (std::none_of(foot.points.begin(), foot.points.end(), touches)) contact_.in_air.push_back(&foot);
+    bool touches = false;
+    for (const int p : plan.patches[k].points) {
+      const auto point = static_cast<std::size_t>(p);
+      contact_.bearing[point] = bears;
+      touches = touches || contact_.touching[point] != ContactState::kOff;
+    }
+    if (plan.patches[k].on_leg && !touches) contact_.in_air.push_back(&plan.patches[k]);
   }
   // In flight nothing holds the trunk against a leg that swings.
-  if (contact_.in_air.size() == feet_.size()) contact_.in_air.clear();
+  if (contact_.in_air.size() == plan.patches.size()) contact_.in_air.clear();
 }
 
 /// Once a cycle, by what is seen of the body. What steers by its stretching needs no other way.

@@ -352,8 +352,10 @@ TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
   const fs::path creature = directory.path / "creature";
   const Outcome outcome = convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--max-error 2%");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("of the processor for a simulated second"), std::string::npos) << outcome.out;
   const nlohmann::json report = report_of(creature), accuracy = report["accuracy"];
   EXPECT_EQ(accuracy["max_error_length"], 0.02);
+  EXPECT_GT(accuracy["ms_per_sim_s"], 0);
   EXPECT_LE(accuracy["estimated_error_length"], 0.02);
   EXPECT_GT(accuracy["work_saved"], 0);
   EXPECT_FALSE(report["replay"]["closed_loop"]["fell"]);

@@ -102,6 +102,8 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
   if (!options.import.up.empty()) record.settings.emplace_back("up", options.import.up);
   if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
+  if (options.import.from_s > 0) record.settings.emplace_back("from", options.import.from_s);
+  if (options.import.to_s) record.settings.emplace_back("to", *options.import.to_s);
   if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
   if (effort != 1) record.settings.emplace_back("corrector_effort", effort);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});

@@ -143,7 +143,7 @@ class Levels {
     ways_.push_back(way);
     std::size_t next = ways_.size();
     if (next == levels_.size()) next = static_cast<std::size_t>(std::max_element(ways_.begin(), ways_.end()) - ways_.begin());
-    if (next == taken_) return false;
+    if (next == taken_ || (next < ways_.size() && ways_[next] == 0)) return false;
     taken_ = next;
     take(creature);
     for (std::size_t k = 0; k < ways_.size(); ++k) {
@@ -156,7 +156,7 @@ class Levels {
   static std::string left(int nodes, double way) {
     char text[120];
     std::snprintf(text, sizeof text, "level: on %d nodes, which the budget allows, the creature ", nodes);
-    std::string word = "fell";
+    std::string word = "fell or got nowhere";
     if (way > 0) word = "kept " + std::to_string(std::lround(100 * way)) + " % of the clip's way";
     return text + word;
   }

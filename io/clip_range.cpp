@@ -72,7 +72,7 @@ ClipRange cut(const ClipRange& range, double from_s, std::optional<double> to_s,
     throw Error(path, place, "it cannot be cut from " + text(from_s) + " to " + text(end_s) + " s",
                 "Give --from and --to within its " + text(range.length_s()) + " s, counted from its first key");
   }
-  return {range.start_s + from_s, range.start_s + std::min(end_s, range.length_s()), range.key_rate_hz};
+  return {range.start_s + from_s, end_s < range.length_s() ? range.start_s + end_s : range.end_s, range.key_rate_hz};
 }
 
 std::size_t choose_clip(const Scene& scene, const std::string& wanted, const std::string& path) {

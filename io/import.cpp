@@ -81,7 +81,7 @@ retarget::Clip sample(const Rig& rig, const Scene& scene, std::size_t index, con
   clip.name = source.name;
   clip.index = static_cast<int>(index);
   clip.range_s = range.length_s();
-  const bool is_whole = range.length_s() == whole.length_s();
+  const bool is_whole = range.start_s == whole.start_s && range.end_s == whole.end_s;
   clip.duration_s = !is_whole ? range.length_s() : (source.duration_s > 0 ? source.duration_s : range.end_s);
   clip.key_rate_hz = range.key_rate_hz;
   const int intervals = std::max(2, static_cast<int>(std::lround(options.sample_rate_hz * clip.range_s)));

@@ -16,7 +16,7 @@ struct StaticBalance {
 /// bears it, in each of sixteen directions that turn with the body: while the weight is borne, its moments about the contacts add
 /// up to none over a loop. Where it does not, masses become less, the more the further a node is outside, as little in squares as
 /// brings the centre of mass a quarter of the support's width inside, none by more than to a fifth.
-/// nodes 3N x F, points 3P x F [m], ground y = 0; mass N; what of the points is lower than `height` [m] bears.
+/// nodes 3N x F, points 3P x F [m], ground y = 0; mass N [kg]; what of the points is lower than `height` [m] bears.
 StaticBalance balance_statically(const Motion& nodes, const Motion& points, const Eigen::VectorXd& mass, double height);
 
 }  // namespace hydrostat::retarget

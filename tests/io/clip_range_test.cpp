@@ -46,6 +46,8 @@ TEST(Cut, CountsFromTheFirstKeyAndKeepsTheRate) {
   EXPECT_EQ(part.key_rate_hz, 24);
   const ClipRange rest = cut(whole, 0.5, {}, "file", "clip 'walk'");
   EXPECT_EQ(rest.end_s, 1.25);
+  const ClipRange odd{0.0416, 4.9583, 24};  // whole is whole, to the bit
+  EXPECT_EQ(cut(odd, 0, {}, "file", "clip 'walk'").end_s, odd.end_s);
   EXPECT_EQ(cut(whole, 0, 1.0004, "file", "clip 'walk'").end_s, 1.25);  // as info prints it, rounded
 }
 

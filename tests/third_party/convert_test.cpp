@@ -96,6 +96,7 @@ TEST(ThirdPartyClips, TheSpiderWalksWhoseBellyHangsOver) {
   expect_creature(kClips[3], [](const fs::path& creature) {
     const json report = report_of(creature), run = report["replay"]["closed_loop"];
     EXPECT_EQ(report["source"]["duration_s"], 0.75);
+    EXPECT_NE(io::read_file(creature / "creature.toml").find("from = 1.375"), std::string::npos);
     EXPECT_NE(report["warnings"].dump().find("tip over its feet"), std::string::npos) << report["warnings"];
     EXPECT_LE(std::abs(run["heading_deg_per_cycle"].get<double>()), 0.3);
     EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), kDrift);

@@ -54,12 +54,14 @@ bool is_up(const retarget::Replay& replay) {
   return !replay.report.fell && replay.termination == physics::Termination::kDone;
 }
 
-/// [m] of the skin; without end where it falls and the finest does not.
-double closed_loop_error(const retarget::Replay& finest, const retarget::Performer& performer,
-                         const retarget::SignalSet& signals, const retarget::StepSetting& setting) {
+/// [m] of the skin, on this control mesh from the finest's closed loop on its own; without end where it falls and the finest
+/// does not.
+double closed_loop_error(const retarget::Replay& finest, const retarget::Performer& of_finest,
+                         const retarget::Performer& performer, const retarget::SignalSet& signals,
+                         const retarget::StepSetting& setting) {
   const retarget::Replay replay = closed_loop(performer, signals, setting);
   if (is_up(finest) && !is_up(replay)) return HUGE_VAL;
-  return retarget::skin_distance(performer, finest.motion, replay.motion);
+  return retarget::skin_distance(of_finest, finest.motion, performer, replay.motion);
 }
 
 /// The first of the candidates from the present one on whose closed loop stays near the finest one's, and up; the finest at
@@ -74,7 +76,7 @@ void take_candidate(ChosenStep& chosen, const retarget::Performer& performer, co
     chosen.setting = {*physics::method_named(row.method), row.dt_s};
     double error_m = row.error_rms_m;
     const bool is_last = chosen.candidate + 1 == chosen.candidates.size();
-    if (!is_last) error_m = std::max(error_m, closed_loop_error(*chosen.finest, performer, signals, chosen.setting));
+    if (!is_last) error_m = std::max(error_m, closed_loop_error(*chosen.finest, performer, performer, signals, chosen.setting));
     chosen.report.estimated_error_length = (error_m + floor_m) / performer.length;
     tell_saved(rows, chosen.curve.recommended, chosen.candidates.back(), chosen.report);
     if (is_last || error_m <= most_m) return;
@@ -139,12 +141,17 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   return chosen;
 }
 
-bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals,
-               std::vector<std::string>& warnings) {
+bool strays(const ChosenStep& chosen, const retarget::Replay& run) {
+  if (!chosen.finest || !is_up(*chosen.finest)) return false;
+  return run.report.world_rms_length > chosen.report.max_error_length + chosen.finest->report.world_rms_length;
+}
+
+bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals) {
   if (chosen.candidate + 1 >= chosen.candidates.size()) return false;
-  warnings.push_back("accuracy: by '" + physics::name_of(chosen.setting.method) +
-                     "', which does less work within the error, the creature fell in the end");
+  chosen.warnings.push_back("accuracy: by '" + physics::name_of(chosen.setting.method) +
+                            "', which does less work within the error for some seconds, the creature fell or strayed in the end");
   ++chosen.candidate;
+  chosen.harmonics = 0;
   take_candidate(chosen, performer, signals);
   return true;
 }
@@ -176,13 +183,32 @@ void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, ret
     chosen.curve.rows.push_back(row);
     if (!row.stable || row.error_rms_m > room) break;
     const retarget::SignalSet fewer = retarget::with_harmonics(signals, harmonics);
-    const double error_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, fewer, chosen.setting));
+    const double error_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, performer, fewer, chosen.setting));
     if (error_m > room) break;
-    kept = harmonics;
+    chosen.harmonics = kept = harmonics;
     chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
     chosen.report.estimated_error_length = error_m / performer.length + chosen.curve.floor;
   }
   if (kept < all) signals = retarget::with_harmonics(signals, kept);
+}
+
+bool take_coarser(ChosenStep& chosen, const retarget::Performer& solved, const retarget::Performer& coarser,
+                  const retarget::SignalSet& signals) {
+  retarget::AccuracyRow row = retarget::measure_level(*chosen.reference, coarser, signals, chosen.setting);
+  row.harmonics = signals.activation.harmonics();
+  const double loop_m = closed_loop_error(*chosen.finest, solved, coarser, signals, chosen.setting);
+  row.falls = loop_m == HUGE_VAL;
+  row.stable = row.stable && !row.falls;
+  chosen.curve.rows.push_back(row);
+  const double error_m = std::max(row.error_rms_m, loop_m);
+  const double error = error_m / solved.length + chosen.curve.floor;
+  const retarget::AccuracyRow& present = chosen.curve.rows[static_cast<std::size_t>(chosen.curve.recommended)];
+  if (!row.stable || error > chosen.report.max_error_length || row.work_ms >= present.work_ms) return false;
+  const int finest = chosen.candidates.back();
+  chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
+  chosen.report.estimated_error_length = error;
+  tell_saved(chosen.curve.rows, chosen.curve.recommended, finest, chosen.report);
+  return true;
 }
 
 retarget::AccuracyReport told(const ChosenStep& chosen) {
@@ -197,13 +223,15 @@ void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve) {
   writer.write("accuracy.svg", io::accuracy_svg(curve));
 }
 
-std::string saved_words(const retarget::AccuracyReport& report) {
+std::string saved_words(const retarget::RunReport& run) {
+  const retarget::AccuracyReport& report = run.accuracy;
   if (report.finest_ms_per_sim_s == 0) return {};
-  char text[240];
+  char text[280];
   std::snprintf(text, sizeof text,
-                "accuracy: %.3g %% of L by '%s' in steps of %.3g s, %.3g ms of the processor for a simulated second; the most accurate that was "
-                "tried takes %.3g ms\n",
-                100 * report.estimated_error_length, report.method.c_str(), report.dt_s, report.ms_per_sim_s, report.finest_ms_per_sim_s);
+                "accuracy: %.3g %% of L on %d nodes by '%s' in steps of %.3g s, %.3g ms of the processor for a simulated second; the most "
+                "accurate that was tried takes %.3g ms\n",
+                100 * report.estimated_error_length, run.body.nodes, report.method.c_str(), report.dt_s, report.ms_per_sim_s,
+                report.finest_ms_per_sim_s);
   return text;
 }
 

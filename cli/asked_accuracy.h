@@ -28,6 +28,9 @@ struct ChosenStep {
   std::optional<retarget::Replay> finest;             // likewise: its closed loop in steps finer than any choice
   std::vector<int> candidates;                        // rows within the error, least work first, the finest at the end
   std::size_t candidate = 0;                          // that is chosen
+  int harmonics = 0;                                  // that signals were cut to; 0: they are whole
+  int wished_nodes = 0;                               // of the control mesh; 0: the creature's own
+  std::vector<std::string> warnings;                  // of what fell
 };
 /// A creature's steps are whole parts of it.
 constexpr double kControlSeconds = 1.0 / 120;
@@ -42,10 +45,13 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::Performer& performer,
                        const retarget::SignalSet& signals, std::optional<physics::Method> only);
 
-/// Takes the next candidate, for what was chosen fell in the end, and says so in a warning; false where there is none.
+/// Whether a whole replay, which lasts longer than what choices are held against, leaves its path by more than the error that was
+/// asked for beyond what the finest setting does.
+bool strays(const ChosenStep& chosen, const retarget::Replay& run);
+
+/// Takes the next candidate, for what was chosen fell or strayed in the end, and says so in a warning more; false where there is none.
 /// `signals` are whole again.
-bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals,
-               std::vector<std::string>& warnings);
+bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals);
 
 /// Steps of a replay, whose control takes kControlSeconds.
 void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting);
@@ -59,8 +65,13 @@ void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve);
 /// tried join the curve.
 void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, retarget::SignalSet& signals);
 
+/// Whether the creature, solved on a coarser control mesh and by signals of as many harmonics, does less work than what is chosen
+/// and yet keeps its skin within the error, in both loops. Then it is chosen; it joins the curve in any case.
+bool take_coarser(ChosenStep& chosen, const retarget::Performer& solved, const retarget::Performer& coarser,
+                  const retarget::SignalSet& signals);
+
 /// The line that tells what a choice costs and saves; empty where nothing was chosen.
-std::string saved_words(const retarget::AccuracyReport& report);
+std::string saved_words(const retarget::RunReport& run);
 
 /// The line that tells of an error above what was asked for.
 std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report);

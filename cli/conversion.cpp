@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <filesystem>
+#include <iostream>
 
+#include "cli/choice_record.h"
 #include "cli/make_performer.h"
 #include "cli/outcome.h"
 #include "cli/wobble_option.h"
@@ -16,6 +18,7 @@
 #include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/flight.h"
+#include "retarget/performed_scenario.h"
 #include "retarget/prepare_standing.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
@@ -80,14 +83,14 @@ retarget::BodyReport body_report(const retarget::Creature& creature) {
 }
 
 io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
-                                   const std::optional<ChosenStep>& chosen, double effort) {
+                                   const std::optional<ChosenStep>& chosen, double effort, int nodes) {
   io::CreatureRecord record;
   record.source_file = fs::absolute(options.clip_file).string();
   record.source_sha256 = report.source.sha256;
   record.clip = report.source.clip;
   record.clip_rise_m = performer.clip_rise;
   record.settings = {{"height", options.height},
-                     {"nodes", std::int64_t{options.nodes}},
+                     {"nodes", std::int64_t{nodes}},
                      {"root-motion", options.root_motion},
                      {"limit", report.inverse.limit},
                      {"limit-chosen-by", options.limit == "auto" ? std::string("auto") : std::string("user")},
@@ -121,12 +124,16 @@ Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
 void Conversion::run(const io::ImportedCharacter& imported, double wished_limit) {
   add_warnings(imported.warnings);
   appearance_ = imported.appearance;
+  solve(imported, wished_limit);
+  if (options_.accuracy.is_asked()) choose(imported, wished_limit);
+  let_go();
+  write();
+}
+
+void Conversion::solve(const io::ImportedCharacter& imported, double wished_limit) {
   make_body(imported);
   find_activations(wished_limit);
   solve_signals();
-  if (options_.accuracy.is_asked()) choose_steps();
-  let_go();
-  write();
 }
 
 void Conversion::add_warnings(const std::vector<std::string>& more) {
@@ -201,15 +208,108 @@ void Conversion::solve_signals() {
   signals_text_ = io::signals_text(signals_);
 }
 
-void Conversion::choose_steps() {
+void Conversion::choose(const io::ImportedCharacter& imported, double wished_limit) {
+  whole_signals_ = signals_;
+  choice_key_ = key_after(key_, signals_text_, options_.method, options_.accuracy.grade, options_.accuracy.max_error,
+                          std::int64_t{options_.nodes}, std::int64_t{options_.seed});
+  if (const std::optional<io::Record> record = stages_.cache().load("accuracy", choice_key_)) {
+    choice_key_.clear();
+    chosen_ = choice_of(*record);
+    repeat_choice(imported, wished_limit);
+    return;
+  }
   stages_.run("accuracy", [&] {
-    const std::optional<physics::Method> only = options_.method == "auto" ? std::nullopt : std::optional(settings_.method);
-    chosen_ = choose_step(options_.accuracy, "hydrostat convert", target_.performer, signals_, only);
-    whole_signals_ = signals_;
-    cut_harmonics(*chosen_, target_.performer, signals_);
+    choose_steps();
+    if (settings_.nodes == 0 && chosen_->report.is_met()) choose_nodes(imported, wished_limit);
     return 0;
   });
+}
+
+void Conversion::repeat_choice(const io::ImportedCharacter& imported, double wished_limit) {
+  add_warnings(chosen_->warnings);
+  cut_signals();
+  if (chosen_->wished_nodes == 0) return;
+  Progress silent(std::cerr, ProgressStyle::silent);
+  Stages stages = coarser_stages(silent);
+  const std::unique_ptr<Conversion> coarser = on_coarser_mesh(imported, wished_limit, chosen_->wished_nodes, stages);
+  coarser->perform();
+  take_over(*coarser);
+}
+
+Stages Conversion::coarser_stages(Progress& progress) const {
+  Stages stages(progress);
+  stages.use_cache(writer_.cache_directory() / "coarser");
+  return stages;
+}
+
+void Conversion::choose_steps() {
+  const std::optional<physics::Method> only = options_.method == "auto" ? std::nullopt : std::optional(settings_.method);
+  chosen_ = choose_step(options_.accuracy, "hydrostat convert", target_.performer, signals_, only);
+  cut_harmonics(*chosen_, target_.performer, signals_);
   tell_signals();
+}
+
+void Conversion::cut_signals() {
+  if (chosen_->harmonics > 0) signals_ = retarget::with_harmonics(whole_signals_, chosen_->harmonics);
+  tell_signals();
+}
+
+void Conversion::choose_nodes(const io::ImportedCharacter& imported, double wished_limit) {
+  constexpr int kFewest = 20;  // as --nodes has it
+  const int own = creature_.mesh.node_count();
+  int last = 0;
+  Progress silent(std::cerr, ProgressStyle::silent);
+  Stages stages = coarser_stages(silent);
+  for (const double part : {0.25, 0.35, 0.5, 0.7}) {
+    const int wished = static_cast<int>(std::lround(part * own));
+    if (wished < kFewest) continue;
+    const std::unique_ptr<Conversion> coarser = on_coarser_mesh(imported, wished_limit, wished, stages);
+    if (!coarser || coarser->creature_.mesh.node_count() == last) continue;
+    last = coarser->creature_.mesh.node_count();
+    if (last >= own) return;
+    ChosenStep chosen = *chosen_;
+    const bool is_taken = take_coarser(chosen, target_.performer, coarser->target_.performer, coarser->signals_);
+    if (is_taken) coarser->perform();
+    if (is_taken && !is_down(coarser->performances_.main()) && !strays(*chosen_, coarser->performances_.main())) {
+      chosen.wished_nodes = wished;
+      chosen_ = std::move(chosen);
+      take_over(*coarser);
+      return;
+    }
+    chosen_->curve.rows.push_back(chosen.curve.rows.back());
+  }
+}
+
+std::unique_ptr<Conversion> Conversion::on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished,
+                                                        Stages& stages) {
+  retarget::CreatureOptions settings = settings_;
+  settings.nodes = wished;
+  auto coarser = std::make_unique<Conversion>(options_, settings, stages, writer_);
+  try {
+    coarser->add_warnings(imported.warnings);
+    coarser->solve(imported, wished_limit);
+  } catch (const Error&) {
+    return nullptr;
+  }
+  coarser->chosen_ = chosen_;
+  coarser->whole_signals_ = coarser->signals_;
+  coarser->cut_signals();
+  return coarser;
+}
+
+void Conversion::take_over(Conversion& coarser) {
+  settings_ = coarser.settings_;
+  key_ = coarser.key_;
+  creature_ = std::move(coarser.creature_);
+  motion_ = std::move(coarser.motion_);
+  inverse_ = std::move(coarser.inverse_);
+  target_ = std::move(coarser.target_);
+  signals_ = std::move(coarser.signals_);
+  whole_signals_ = std::move(coarser.whole_signals_);
+  performances_ = std::move(coarser.performances_);
+  target_file_ = std::move(coarser.target_file_);
+  signals_text_ = std::move(coarser.signals_text_);
+  is_performed_ = true;
 }
 
 void Conversion::tell_signals() {
@@ -220,13 +320,15 @@ void Conversion::tell_signals() {
 }
 
 void Conversion::let_go() {
-  perform();
-  while (chosen_ && is_down(performances_.main()) &&
-         take_next(*chosen_, target_.performer, whole_signals_, target_.report.warnings)) {
+  if (!is_performed_) perform();
+  const auto is_short_of_it = [&] { return is_down(performances_.main()) || strays(*chosen_, performances_.main()); };
+  while (chosen_ && is_short_of_it() && take_next(*chosen_, target_.performer, whole_signals_)) {
+    add_warnings({chosen_->warnings.back()});
     signals_ = whole_signals_;
     tell_signals();
     perform();
   }
+  if (!choice_key_.empty()) stages_.cache().store("accuracy", choice_key_, record_of_choice(*chosen_));
   add_warnings(retarget::feedback_warnings(performances_));
   if (chosen_) target_.report.accuracy = told(*chosen_);
   report_replays(performances_, target_.report);
@@ -257,7 +359,7 @@ void Conversion::perform() {
 void Conversion::write() {
   const retarget::Performer& performer = target_.performer;
   stages_.run("files", [&] {
-    writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.effort)));
+    writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.effort, settings_.nodes)));
     writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                              dominant_bones_of_nodes(creature_.mesh.bone_weights)));
     writer_.write("target.bin", target_file_);

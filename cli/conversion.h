@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,10 +19,9 @@ class Conversion {
  public:
   Conversion(const ConvertOptions& options, const retarget::CreatureOptions& settings, Stages& stages,
              io::CreatureWriter& writer)
-      : options_(options), settings_(settings), stages_(stages), writer_(writer) {
-    stages_.use_cache(writer.cache_directory());
-  }
+      : options_(options), settings_(settings), stages_(stages), writer_(writer) {}
 
+  /// wished_limit 0: automatic.
   void run(const io::ImportedCharacter& imported, double wished_limit);
 
   const retarget::Performances& performances() const { return performances_; }
@@ -30,9 +30,11 @@ class Conversion {
  private:
   void add_warnings(const std::vector<std::string>& more);
 
+  /// Body, activations and signals on a control mesh.
+  void solve(const io::ImportedCharacter& imported, double wished_limit);
+
   void make_body(const io::ImportedCharacter& imported);
 
-  /// wished_limit 0: automatic.
   void find_activations(double wished_limit);
 
   void plan_wobble();
@@ -43,8 +45,25 @@ class Conversion {
 
   void solve_signals();
 
-  /// The cheapest method and step that keep the error asked for, then as few harmonics as leave it so.
+  /// The cheapest method and step that keep the error asked for, then as few harmonics as leave it so, then the coarsest
+  /// control mesh, where none was asked for; or what was chosen the last time from the very same.
+  void choose(const io::ImportedCharacter& imported, double wished_limit);
+
+  void repeat_choice(const io::ImportedCharacter& imported, double wished_limit);
+
   void choose_steps();
+
+  /// Solved, and on its feet to the end, on the coarsest mesh that keeps the error: it takes the place of what is here.
+  void choose_nodes(const io::ImportedCharacter& imported, double wished_limit);
+
+  /// The same on a mesh of so many wished nodes; none where the clip cannot be solved on it.
+  std::unique_ptr<Conversion> on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished, Stages& stages);
+
+  Stages coarser_stages(Progress& progress) const;
+
+  void take_over(Conversion& coarser);
+
+  void cut_signals();
 
   void tell_signals();
 
@@ -57,7 +76,7 @@ class Conversion {
   void write();
 
   const ConvertOptions& options_;
-  const retarget::CreatureOptions settings_;
+  retarget::CreatureOptions settings_;
   Stages& stages_;
   io::CreatureWriter& writer_;
   std::string key_;  // of the last stage
@@ -67,7 +86,9 @@ class Conversion {
   io::PerformedTarget target_;
   retarget::SignalSet signals_, whole_signals_;  // the latter before an accuracy cut them
   std::optional<ChosenStep> chosen_;
+  std::string choice_key_;                       // empty: the choice came from the cache
   retarget::Performances performances_;
+  bool is_performed_ = false;
   io::Appearance appearance_;
   std::string target_file_, signals_text_;
 };

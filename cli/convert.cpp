@@ -31,6 +31,7 @@ int convert(const ConvertOptions& options) {
   Stages stages(progress);
   const io::ImportedCharacter imported = stages.run("import", [&] { return import(options); });
   io::CreatureWriter writer(options.out, io::CreatureWriter::Start::afresh);
+  stages.use_cache(writer.cache_directory());
   Conversion conversion(options, settings, stages, writer);
   try {
     conversion.run(imported, limit);
@@ -43,7 +44,7 @@ int convert(const ConvertOptions& options) {
   const int exit_code =
       options.json ? tell_report(run, options.out, motion_file, conversion.report()) : tell_run(run, options.out, motion_file);
   const retarget::AccuracyReport& accuracy = conversion.report().accuracy;
-  if (!options.json) std::cout << saved_words(accuracy);
+  if (!options.json) std::cout << saved_words(conversion.report());
   if (exit_code != kDone || accuracy.is_met()) return exit_code;
   std::cerr << too_inaccurate(options.clip_file, accuracy) << std::endl;
   return kShortOfTarget;

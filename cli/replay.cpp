@@ -230,7 +230,8 @@ int replay(const ReplayCommand& command) {
     performances = perform();
   }
   while (chosen && !command.open_loop && is_down(performances.main()) &&
-         take_next(*chosen, performer, creature.signals, creature.target.report.warnings)) {
+         take_next(*chosen, performer, creature.signals)) {
+    creature.target.report.warnings.push_back(chosen->warnings.back());
     take_steps(options.replay, chosen->setting);
     performances = perform();
   }
@@ -269,7 +270,7 @@ int replay(const ReplayCommand& command) {
   const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();
   const int exit_code =
       command.json ? tell_report(run, command.directory, motion_file, report) : tell_run(run, command.directory, motion_file);
-  if (!command.json) std::cout << saved_words(report.accuracy);
+  if (!command.json) std::cout << saved_words(report);
   if (is_met || exit_code != kDone) return exit_code;
   std::cerr << too_inaccurate(command.directory, report.accuracy) << std::endl;
   return kShortOfTarget;

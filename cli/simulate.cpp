@@ -191,7 +191,7 @@ int tell(const SimulateCommand& command, const retarget::RunReport& report) {
     std::cerr << too_inaccurate(command.scene, report.accuracy) << std::endl;
     return kShortOfTarget;
   }
-  if (!command.json) std::cout << summary(report, command.out) << "\n" << saved_words(report.accuracy);
+  if (!command.json) std::cout << summary(report, command.out) << "\n" << saved_words(report);
   return kDone;
 }
 

@@ -21,6 +21,8 @@ class Stages {
 
   void use_cache(const std::filesystem::path& directory) { cache_.emplace(directory); }
 
+  const io::StageCache& cache() const { return *cache_; }
+
   template <typename Make>
   auto run(const std::string& name, const Make& make) {
     progress_.begin(name);

@@ -3,7 +3,7 @@
 #include "physics/internal_forces.h"
 #include "physics/stepper.h"
 #include "retarget/contacts.h"
-#include "retarget/muscles.h"
+#include "retarget/muscle_response.h"
 
 namespace hydrostat::retarget {
 
@@ -21,7 +21,9 @@ struct CorrectorOptions {
   double foot_settle_s = 0.1;   // tau of a foot in the air
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
   double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
-  int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
+  int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error,
+  int hurried_every = 2;        // while it is below hurried_error; above that it is made at each call
+  double hurried_error = 0.04;
 };
 
 /// What contact does when muscles are corrected, and what it is to do.
@@ -61,15 +63,7 @@ class Corrector {
   double least_margin() const;
 
  private:
-  /// What the muscles do to the constraints of one element.
-  struct ElementFields {
-    std::vector<Eigen::Index> muscles;
-    Eigen::MatrixXd fields;  // pairs x muscles
-  };
-  void add_response_of_springs(const physics::State& state);
-  void add_response_of_elements(const physics::State& state);
-  bool factor_system(const physics::State& state, const ContactNow& contact);
-  bool respond(const physics::State& state, const ContactNow& contact);
+  int calls_for_response() const;
   void find_free_deviation(const physics::State& state, const physics::State& reference);
   double weigh_momentum(const physics::State& state, double grip);
   void weigh_feet(const physics::State& state, const physics::State& reference, const std::vector<const Patch*>& in_air);
@@ -78,20 +72,12 @@ class Corrector {
   const Muscles& muscles_;
   CorrectorOptions options_;
   double speed_unit_, limit_, contact_stiffness_;
-  physics::SystemMatrix matrix_;
+  Eigen::VectorXd node_shares_;  // 3N: the squared weight of each row of nodes
+  MuscleResponse responses_;
   physics::InternalForces<3> forces_;
-  std::vector<std::vector<int>> springs_of_;                // of each muscle: the springs that it shortens
-  Eigen::VectorXd node_shares_;                             // 3N: the squared weight of each row of nodes
-  std::vector<std::vector<ElementFields>> element_fields_;  // of the elements of each block
-  Eigen::MatrixXd response_;       // 3N x muscles: change of velocity by each
-  Eigen::MatrixXd node_normal_;    // muscles x muscles: the response's own products, nodes weighted
-  bool has_response_ = false;
-  std::vector<ContactState> touching_of_response_;
-  int response_age_ = 0;
   double momentum_error_ = 0;      // at the last call, in speeds per sqrt(g L)
   Eigen::VectorXd deviation_;      // 3N: the change of velocity that comes without any muscle, later with the error of place
-  Eigen::MatrixXd weighted_, normal_, scaled_, cones_;  // weighted_: the few rows beside the nodes', x (muscles + 1)
-  Eigen::Matrix3Xd pull_;          // 3 x E [N s]: of a spring's unit activation over the horizon
+  Eigen::MatrixXd weighted_, normal_, cones_;  // weighted_: the few rows beside the nodes', x (muscles + 1)
   Eigen::VectorXd previous_;
   Eigen::Matrix3Xd force_, reference_force_;
 };

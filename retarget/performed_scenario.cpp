@@ -62,11 +62,12 @@ Replay perform_briefly(const Performer& performer, const SignalSet& signals, con
   return *perform(performer, signals, perform_options).closed_loop;
 }
 
-double skin_distance(const Performer& performer, const Motion& a, const Motion& b) {
+double skin_distance(const Performer& of_a, const Motion& a, const Performer& of_b, const Motion& b) {
   const Eigen::Index frames = std::min(a.count(), b.count());
   double sum = 0;
-  for (Eigen::Index f = 0; f < frames; ++f) sum += embedded_positions(performer.embedding, a.at(f) - b.at(f)).squaredNorm();
-  return std::sqrt(sum / static_cast<double>(frames * performer.embedding.count()));
+  for (Eigen::Index f = 0; f < frames; ++f)
+    sum += (embedded_positions(of_a.embedding, a.at(f)) - embedded_positions(of_b.embedding, b.at(f))).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(frames * of_a.embedding.count()));
 }
 
 }  // namespace hydrostat::retarget

@@ -25,7 +25,8 @@ AccuracyRow measure_level(const ReferenceOf<3>& reference, const Performer& leve
 /// here they show.
 Replay perform_briefly(const Performer& performer, const SignalSet& signals, const ReplayOptions& options);
 
-/// Between two replays of a creature [m, RMS over the skin's vertices and the frames that both have].
-double skin_distance(const Performer& performer, const Motion& a, const Motion& b);
+/// Between replays of a creature on two control meshes, which may be one [m, RMS over the skin's vertices and the frames that
+/// both have].
+double skin_distance(const Performer& of_a, const Motion& a, const Performer& of_b, const Motion& b);
 
 }  // namespace hydrostat::retarget

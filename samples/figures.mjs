@@ -1,11 +1,11 @@
 // The tables of README that are measured, from what the program and the benchmarks wrote; samples/figures.sh calls it.
-//   node figures.mjs levels|peers|damping|import KEPT.csv README.md [MEASURED...]
+//   node figures.mjs levels|chosen|peers|damping|import KEPT.csv README.md [MEASURED...]
 // KEPT.csv holds what the table shows. Measured rows take the place of those of the same creature, solver, body or file; without
-// any the table is written from what is kept. MEASURED: reports NAME.LEVEL.json of 'hydrostat replay --json', or CSV files.
+// any the table is written from what is kept. MEASURED: reports NAME.LEVEL.json of 'hydrostat replay --json', creatures (for 'chosen'), or CSV files.
 //   node figures.mjs speed KEPT.txt README.md [PRINTED.txt]
 // 'levels' draws its picture beside KEPT.csv, too.
 import {existsSync, readFileSync, renameSync, writeFileSync} from 'node:fs';
-import {basename} from 'node:path';
+import {basename, join} from 'node:path';
 
 import {write_between_marks} from './between_marks.mjs';
 import {levels_svg} from './levels_svg.mjs';
@@ -66,6 +66,29 @@ function levels_table(rows) {
   }));
 }
 
+/** What 'hydrostat convert --max-error' chose for a creature, beside the most accurate setting that it tried. */
+function chosen_row(creature) {
+  const report = JSON.parse(readFileSync(join(creature, 'report.json'), 'utf8'));
+  const tried = read_csv(join(creature, 'accuracy.csv'));
+  const {accuracy, body, signals, replay} = report, run = replay.closed_loop;
+  const most = (name) => Math.max(...tried.map((row) => Number(row[name])));
+  const way = run.clip_travel_per_cycle_length;
+  return {
+    creature: basename(creature), max_error: accuracy.max_error_length, estimated_error: Number(accuracy.estimated_error_length.toPrecision(3)),
+    method: accuracy.method, nodes: body.nodes, whole_nodes: most('nodes'), harmonics: signals.harmonics, whole_harmonics: most('harmonics'),
+    ms_per_sim_s: Number(accuracy.ms_per_sim_s.toPrecision(4)), finest_ms_per_sim_s: Number(accuracy.finest_ms_per_sim_s.toPrecision(4)),
+    falls: run.fell ? 1 : 0, way: run.fell || Math.abs(way) < 0.01 ? '' : Number((run.travel_per_cycle_length / way).toPrecision(4)),
+  };
+}
+
+function chosen_table(rows) {
+  const percent = (share) => `${short(100 * share, 2)} %`;
+  return markdown(['creature', 'within', 'estimated error', 'method', 'nodes', 'harmonics', 'processor, ms a simulated second', 'the finest setting', "of the clip's way"],
+    rows.map((row) => [`\`${row.creature}\``, percent(row.max_error), percent(row.estimated_error), `\`${row.method}\``, `${row.nodes} of ${row.whole_nodes}`,
+      `${row.harmonics} of ${row.whole_harmonics}`, short(Number(row.ms_per_sim_s), 2), short(Number(row.finest_ms_per_sim_s), 2),
+      Number(row.falls) ? 'falls' : row.way === '' ? 'on the spot' : `${Math.round(100 * row.way)} %`]));
+}
+
 function peers_table(rows) {
   const lost = (row) => (row.scene !== 'tumbling' ? '' :
     row.angular_loss < 1e-3 ? Number(row.angular_loss).toExponential(0).replace(/e-(\d)$/, 'e-0$1') : `${Math.round(100 * row.angular_loss)} %`);
@@ -102,6 +125,11 @@ const kinds = {
     columns: ['creature', 'nodes', 'solved_nodes', 'work_ms', 'falls', 'clip_shape_rms_length', 'way'],
     read: (files) => files.map(level_row).sort((a, b) => a.nodes - b.nodes), key: (row) => row.creature, table: levels_table,
   },
+  chosen: {
+    columns: ['creature', 'max_error', 'estimated_error', 'method', 'nodes', 'whole_nodes', 'harmonics', 'whole_harmonics', 'ms_per_sim_s',
+      'finest_ms_per_sim_s', 'falls', 'way'],
+    read: (creatures) => creatures.map(chosen_row), key: (row) => row.creature, table: chosen_table,
+  },
   peers: {
     columns: ['scene', 'tets', 'solver', 'steps_per_s', 'cpu_ms_per_s', 'times_of_bullet_60', 'rms_error_m', 'angular_loss'],
     read: (files) => files.flatMap(read_csv).filter((row) => row.cpu_ms_per_s !== ''), table: peers_table,
@@ -131,6 +159,6 @@ if (kind === 'speed') {
   write_between_marks(readme, `samples/figures.sh ${kind}`, table(rows));
   if (kind === 'levels') write_whole(kept_file.replace(/csv$/, 'svg'), levels_svg(rows));
 } else {
-  console.error(`figures.mjs: '${kind}' is no table. Name levels, peers, damping, import or speed.`);
+  console.error(`figures.mjs: '${kind}' is no table. Name levels, chosen, peers, damping, import or speed.`);
   process.exit(2);
 }

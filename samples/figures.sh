@@ -2,6 +2,7 @@
 # Makes the pictures and the measured tables of README anew:  samples/figures.sh [WHAT...]
 #   scenes    pictures of the scenes' accuracy and effects                          minutes
 #   creature  the trot's own curve of accuracy                                      a quarter of an hour
+#   chosen    what convert --max-error 2% chooses for worm, trot and fox  ten minutes
 #   levels    levels of detail, table and picture (clips that are not ours from HYDROSTAT_ASSETS, where they are there)  an hour
 #   speed     what the stages of a conversion cost                                  minutes
 #   import    what reading the samples costs                                        seconds
@@ -63,6 +64,21 @@ run_creature() {
   "$hydrostat" bench accuracy "$out/boxdog_trot" -o "$out/trot" --max-error 2% --own-mesh --duration 0.2 --quiet
   cp -- "$out/trot/accuracy.svg" "$figures/accuracy_boxdog_trot.svg"
 }
+run_chosen() {
+  local creatures=()
+  choose() {  # NAME CLIP OPTION...
+    if [ ! -f "$2" ]; then
+      echo "figures.sh: $2: is not there. The row of '$1' stays as it is."
+      return
+    fi
+    "$hydrostat" convert "$2" -o "$out/chosen/$1" --max-error 2% --quiet "${@:3}" || [ $? = 3 ]
+    creatures+=("$out/chosen/$1")
+  }
+  choose boxdog_trot "$project/samples/boxdog_trot.fbx"
+  choose worm_crawl "$project/samples/worm_crawl.glb"
+  choose fox "$assets/gltf/fox.glb" --clip Walk --height 0.6
+  table chosen csv "${creatures[@]}"
+}
 run_levels() {
   mkdir -p -- "$out/reports"
   reports=()
@@ -91,15 +107,15 @@ run_peers() {
 run_stability() { "$project/tests/stability/run.sh" && "$project/tests/stability/run.sh" -r; }
 run_draw() {
   local kept
-  for kept in levels.csv peers.csv damping.csv import.csv speed.txt; do
+  for kept in levels.csv chosen.csv peers.csv damping.csv import.csv speed.txt; do
     [ ! -f "$figures/$kept" ] || table "${kept%.*}" "${kept##*.}"
   done
 }
 
-[ $# -gt 0 ] || set -- scenes creature levels speed import damping peers
+[ $# -gt 0 ] || set -- scenes creature chosen levels speed import damping peers
 for what; do
   [ "$(type -t "run_$what")" = function ] || {
-    echo "figures.sh: '$what' is nothing that it makes. Name scenes, creature, levels, speed, import, damping, peers, stability or draw." >&2
+    echo "figures.sh: '$what' is nothing that it makes. Name scenes, creature, chosen, levels, speed, import, damping, peers, stability or draw." >&2
     exit 2
   }
 done

@@ -133,6 +133,18 @@ TEST_F(AccuracyCommands, AnEffectThatIsOffCostsNoInstruction) {
   ASSERT_GT(plain, 1e5);
   EXPECT_NEAR(off, plain, 1e-3 * plain);
   EXPECT_GT(on, 1.01 * plain);
+  const std::string box = "[[obstacle]]\nshape = \"box\"\nsize_m = [0.2, 0.2]\nposition_m = [0.0, -0.32]\n",
+                    push = "[[push]]\ntime_s = 0.0\ndelta_v_m_s = [1.0, 0.0]\n";
+  const struct {
+    std::string text, effect;
+  } off_or_on[] = {{"[ground]\nheight_m = -0.2\n", "ground"}, {box, "obstacles"}, {push, "pushes"}, {"", "self_contact"}};
+  for (const auto& [text, effect] : off_or_on) {
+    SCOPED_TRACE(effect);
+    io::write_file(directory.path / "off.toml", shape + text + "[effects]\n" + effect + " = \"off\"\n");
+    io::write_file(directory.path / "on.toml", shape + text + "[effects]\n" + effect + " = \"on\"\n");
+    EXPECT_NEAR(instructions(directory.path, "off.toml"), plain, 1e-3 * plain);
+    EXPECT_GT(instructions(directory.path, "on.toml"), 1.001 * plain);
+  }
   const std::string seam = "[[seam]]\nnormal = [0.0, 1.0]\n[effects]\nfracture = ";
   io::write_file(directory.path / "whole.toml", shape + seam + "\"off\"\n");
   io::write_file(directory.path / "seamed.toml", shape + seam + "\"on\"\n");

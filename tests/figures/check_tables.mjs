@@ -2,7 +2,7 @@
 // where one is not as it must be.
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
-import {mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync} from 'node:fs';
+import {mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {dirname, join} from 'node:path';
 import {fileURLToPath} from 'node:url';
@@ -47,6 +47,17 @@ function levels() {
   const [csv, text] = [readFileSync(kept), readFileSync(page)];
   assert.deepEqual(lines_made('levels', kept), lines); // from what was kept
   assert.deepEqual([readFileSync(kept), readFileSync(page)], [csv, text]);
+}
+
+function chosen() {
+  mkdirSync(file('eel'));
+  writeFileSync(join(file('eel'), 'accuracy.csv'), 'method,element,nodes,harmonics\nexplicit,tet,90,16\nspring,tet,40,4\n');
+  const closed_loop = {fell: false, travel_per_cycle_length: 0.49, clip_travel_per_cycle_length: 0.5};
+  const accuracy = {max_error_length: 0.02, estimated_error_length: 0.01234, method: 'spring', ms_per_sim_s: 61.04, finest_ms_per_sim_s: 256.1};
+  writeFileSync(join(file('eel'), 'report.json'), JSON.stringify({accuracy, body: {nodes: 40}, signals: {harmonics: 4}, replay: {closed_loop}}));
+  const lines = lines_made('chosen', file('chosen.csv'), file('eel'));
+  assert.deepEqual(lines.slice(2), ['| `eel` | 2 % | 1.2 % | `spring` | 40 of 90 | 4 of 16 | 61 | 256 | 98 % |']);
+  assert.deepEqual(lines_made('chosen', file('chosen.csv')), lines);
 }
 
 /** The ratio of the times goes with a power of E and passes 1 at a known one. */
@@ -112,4 +123,4 @@ function readme_is_true() {
   }
 }
 
-for (const check of [levels, damping, peers, imports_and_speed, refusals, stability, readme_is_true]) check();
+for (const check of [levels, chosen, damping, peers, imports_and_speed, refusals, stability, readme_is_true]) check();

@@ -45,6 +45,7 @@ TEST_F(SceneEffects, AreOnWhereASceneNeedsThemAndOffWhereNot) {
   };
   const std::string ground = "[ground]\n", box = "[[obstacle]]\nshape = \"box\"\nsize_m = [0.2, 0.2]\n",
                     thrown = "velocity_m_s = [0.0, 2.0]\n", sunk = "velocity_m_s = [0.0, -2.0]\n",
+                    slender = "dimension = 2\n[body]\nshape = \"bar\"\nsize_m = [0.1, 2.0]\ncell_size_m = 0.1\nposition_m = [0.0, 1.1]\n",
                     wind = "[air]\nvelocity_m_s = [20.0, 0.0]\n", seam = "[[seam]]\nnormal = [0.0, 1.0]\n";
   const Case cases[] = {
       {kBody, "gravity", true},
@@ -79,6 +80,9 @@ TEST_F(SceneEffects, AreOnWhereASceneNeedsThemAndOffWhereNot) {
       {kBody, "damping", true},
       {kBody + "[material]\ndamping_time_s = 0.0\n", "damping", false},
       {kBody, "self_contact", false},
+      {slender + ground, "self_contact", true},  // it lies down, and could meet itself
+      {slender, "self_contact", false},  // nothing bends it
+      {slender + ground + "[effects]\nself_contact = \"off\"\n", "self_contact", false},
       {kBody, "fracture", false},
       {kBody + seam, "fracture", false},  // it falls freely
       {kBody + seam + ground, "fracture", true},

@@ -46,6 +46,12 @@ class Conversion {
   /// The cheapest method and step that keep the error asked for, then as few harmonics as leave it so.
   void choose_steps();
 
+  /// Into the scene that was asked for; body and signals stay those of the flat ground.
+  void put_in_scene();
+
+  /// As it is let go.
+  const retarget::Performer& performer() const { return in_scene_ ? *in_scene_ : target_.performer; }
+
   void tell_signals();
 
   void let_go();
@@ -69,7 +75,8 @@ class Conversion {
   std::optional<ChosenStep> chosen_;
   retarget::Performances performances_;
   io::Appearance appearance_;
-  std::string target_file_, signals_text_;
+  std::string target_file_, signals_text_, scene_text_;
+  std::optional<retarget::Performer> in_scene_;
 };
 
 }  // namespace hydrostat::cli

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "retarget/contact_cones.h"
+#include "retarget/contact_loads.h"
 
 namespace hydrostat::retarget {
 
@@ -13,7 +14,7 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
     : scene_(scene),
       muscles_(muscles),
       options_(options),
-      speed_unit_(std::sqrt(scene.gravity.norm() * length)),
+      speed_unit_(std::sqrt(gravity_unit(scene) * length)),
       limit_(limit),
       matrix_(scene.body),
       forces_(scene.body) {
@@ -27,7 +28,7 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
   const double unit = options.node_weight / speed_unit_;
   node_shares_ = (unit * unit / scene.body.mass.sum()) * scene.body.mass.transpose().replicate<3, 1>().reshaped();
   // Stiff against the body's own springs, soft enough for the factor: a point gives half a thousandth of L under the weight.
-  contact_stiffness_ = scene.body.mass.sum() * scene.gravity.norm() / (5e-4 * length);
+  contact_stiffness_ = scene.body.mass.sum() * gravity_unit(scene) / (5e-4 * length);
   for (const physics::BodyElements<3>& elements : scene.body.elements) {
     std::vector<ElementFields>& all = element_fields_.emplace_back();
     for (const auto pairs : elements.fit.of_element.colwise()) {
@@ -204,7 +205,7 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.
   weighted_.resize(6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
   weigh_feet(state, reference, contact.in_air);
-  const double weight = body.mass.sum() * scene_.gravity.norm();
+  const double weight = body.mass.sum() * gravity_unit(scene_);
   cone_rows(scene_, contact.touching, contact.bearing, contact.force / weight,
             (contact_stiffness_ * options_.horizon_s / weight) * response_, previous_, cones_);
   deviation_ += (state.x - reference.x).reshaped() / options_.settle_s;

@@ -12,6 +12,7 @@
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
 #include "retarget/stride_feedback.h"
+#include "retarget/uneven_ground.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -76,6 +77,7 @@ class Run {
   Corrector corrector_;
   Observer observer_;
   ReferenceGlide glide_;
+  std::optional<UnevenGround> uneven_;  // where there is more than the plan's ground
   StrideFeedback stride_;
   ReturnMap return_map_;
   long cycles_ = 0;  // of a loop, whose ends were seen
@@ -129,6 +131,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       metrics_(input, control_s_, steps_, state_),
       frames_{column(state_.x)} {
   state_.obstacle_travel.setZero(3, static_cast<Eigen::Index>(plant_.obstacles.size()));
+  if (!plant_.obstacles.empty()) uneven_.emplace(plant_, input.prepared, input.length, options.corrector.clearance);
   curve_.at(0, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   if (!options.trace) return;
@@ -156,7 +159,8 @@ void Run::look_at_contacts() {
       contact_.bearing[point] = bears;
       touches = touches || contact_.touching[point] != ContactState::kOff;
     }
-    if (plan.patches[k].on_leg && !touches) contact_.in_air.push_back(&plan.patches[k]);
+    const bool is_caught = uneven_ && touches && planned[now] == ContactState::kOff;  // by an edge: it is to get over it
+    if (plan.patches[k].on_leg && (!touches || is_caught)) contact_.in_air.push_back(&plan.patches[k]);
   }
   // In flight nothing holds the trunk against a leg that swings.
   if (contact_.in_air.size() == plan.patches.size()) contact_.in_air.clear();
@@ -220,6 +224,11 @@ void Run::control() {
   stride_.follow(fit_, control_s_);
   keep_way();
   look_at_contacts();
+  if (uneven_) {
+    uneven_->look(time_s_, control_s_, fit_, seen);
+    uneven_->lift(contact_.in_air, contact_.lift);
+    uneven_->apply(physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
+  }
   input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
   stride_.apply(time_s_ + 0.5 * control_s_, activation_);
   return_map_.apply(time_s_ + 0.5 * control_s_, activation_);

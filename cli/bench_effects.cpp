@@ -9,9 +9,12 @@
 #include "cli/command_line.h"
 #include "cli/number_option.h"
 #include "cli/subject.h"
+#include "io/creature_scene.h"
 #include "io/effects_page.h"
 #include "io/write_file.h"
-#include "retarget/error.h"
+#include "retarget/effect_bench.h"
+#include "retarget/effect_plan.h"
+#include "retarget/performed_scenario.h"
 
 namespace hydrostat::cli {
 
@@ -24,18 +27,31 @@ struct EffectsCommand {
   double duration = 2;
 };
 
-int effects(const EffectsCommand& command) {
-  const Subject subject = read_subject(command.subject);
-  if (!subject.scene) {
-    throw Error(command.subject, "", "the effects of a creature cannot be switched one by one",
-                "Give a scene, or see 'hydrostat explain'.");
-  }
+std::vector<retarget::EffectRow> of_scene(const EffectsCommand& command, const io::SceneFile& scene) {
   retarget::SimulationOptions options;
-  options.method = subject.scene->method;
-  options.dt_s = subject.scene->dt_s;
-  options.duration_s = std::min(command.duration, subject.scene->duration_s);
-  const std::vector<retarget::EffectRow> rows = std::visit(
-      [&](const auto& scenario) { return retarget::measure_effects(scenario, options); }, subject.scene->scenario);
+  options.method = scene.method;
+  options.dt_s = scene.dt_s;
+  options.duration_s = std::min(command.duration, scene.duration_s);
+  return std::visit([&](const auto& scenario) { return retarget::measure_effects(scenario, options); }, scene.scenario);
+}
+
+/// Its open loop in the scene of its own: feedback would hide what an effect does.
+std::vector<retarget::EffectRow> of_creature(const EffectsCommand& command, io::LoadedCreature& creature) {
+  retarget::Performer& performer = creature.target.performer;
+  io::put_in_own_scene(command.subject, performer);
+  retarget::SimulationOptions options;
+  options.method = physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
+  options.dt_s = io::setting(creature.record, "step_s", retarget::ReplayOptions().step_s);
+  options.duration_s = command.duration;
+  retarget::ScenarioOf<3> scenario = retarget::performed_scenario(performer, creature.signals);
+  if (scenario.decisions.empty()) retarget::plan_effects<3>({}, scenario);
+  return retarget::measure_effects(scenario, options);
+}
+
+int effects(const EffectsCommand& command) {
+  Subject subject = read_subject(command.subject);
+  const std::vector<retarget::EffectRow> rows =
+      subject.scene ? of_scene(command, *subject.scene) : of_creature(command, *subject.creature);
   const fs::path out = command.out;
   const std::string name = fs::path(command.subject).filename().string();
   io::write_file(out / "effects.csv", io::effects_csv(rows));
@@ -54,8 +70,8 @@ int effects(const EffectsCommand& command) {
 
 void add_bench_effects(CLI::App& bench, int& exit_code) {
   const auto command = std::make_shared<EffectsCommand>();
-  CLI::App* sub = bench.add_subcommand("effects", "A scene without effects, with each of its own alone, and with all");
-  sub->add_option("SCENE", command->subject, "TOML file (README, 'Scene files')")->required();
+  CLI::App* sub = bench.add_subcommand("effects", "A scene or creature without effects, with each of its own alone, and with all");
+  sub->add_option("SCENE|DIR", command->subject, "TOML file (README, 'Scene files') or creature")->required();
   sub->add_option("-o,--out", command->out, "Directory for effects.csv, effects.svg and effects.html")->required();
   sub->add_option("--duration", command->duration, "Seconds to simulate, at most [2]")->check(number_within(0.01, 60));
   sub->callback([command, &exit_code] { exit_code = effects(*command); });

@@ -10,6 +10,7 @@
 #include "cli/wobble_option.h"
 #include "io/body_file.h"
 #include "io/creature_record.h"
+#include "io/creature_scene.h"
 #include "io/fingerprint.h"
 #include "io/gltf_out.h"
 #include "io/signals_file.h"
@@ -107,6 +108,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
   if (options.import.from_s > 0) record.settings.emplace_back("from", options.import.from_s);
   if (options.import.to_s) record.settings.emplace_back("to", *options.import.to_s);
+  if (!options.scene.empty()) record.settings.emplace_back("scene", fs::absolute(options.scene).string());
   if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
   if (effort != 1) record.settings.emplace_back("corrector_effort", effort);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
@@ -122,10 +124,12 @@ Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
 }  // namespace
 
 void Conversion::run(const io::ImportedCharacter& imported, double wished_limit) {
+  if (!options_.scene.empty()) scene_text_ = io::creature_scene_text(options_.scene);
   add_warnings(imported.warnings);
   appearance_ = imported.appearance;
   solve(imported, wished_limit);
   if (options_.accuracy.is_asked()) choose(imported, wished_limit);
+  put_in_scene();
   let_go();
   write();
 }
@@ -211,7 +215,7 @@ void Conversion::solve_signals() {
 void Conversion::choose(const io::ImportedCharacter& imported, double wished_limit) {
   whole_signals_ = signals_;
   choice_key_ = key_after(key_, signals_text_, options_.method, options_.accuracy.grade, options_.accuracy.max_error,
-                          std::int64_t{options_.nodes}, std::int64_t{options_.seed});
+                          std::int64_t{options_.nodes}, std::int64_t{options_.seed}, scene_text_);
   if (const std::optional<io::Record> record = stages_.cache().load("accuracy", choice_key_)) {
     choice_key_.clear();
     chosen_ = choice_of(*record);
@@ -319,9 +323,19 @@ void Conversion::tell_signals() {
   target_file_ = io::target_bytes(target_);
 }
 
+void Conversion::put_in_scene() {
+  if (options_.scene.empty()) return;
+  in_scene_ = target_.performer;
+  add_warnings(io::put_in_scene(options_.scene, *in_scene_));
+  key_ = key_after(key_, scene_text_);
+  is_performed_ = false;
+}
+
 void Conversion::let_go() {
   if (!is_performed_) perform();
-  const auto is_short_of_it = [&] { return is_down(performances_.main()) || strays(*chosen_, performances_.main()); };
+  const auto is_short_of_it = [&] {  // of the error as it was measured: outside a scene
+    return is_down(performances_.main()) || (!in_scene_ && strays(*chosen_, performances_.main()));
+  };
   while (chosen_ && is_short_of_it() && take_next(*chosen_, target_.performer, whole_signals_)) {
     add_warnings({chosen_->warnings.back()});
     signals_ = whole_signals_;
@@ -333,7 +347,7 @@ void Conversion::let_go() {
   if (chosen_) target_.report.accuracy = told(*chosen_);
   report_replays(performances_, target_.report);
   stages_.run("measurement", [&] {
-    measure(target_.performer, signals_, perform_options(), target_.report);
+    measure(performer(), signals_, perform_options(), target_.report);
     return 0;
   });
 }
@@ -353,11 +367,11 @@ void Conversion::perform() {
   const retarget::PerformOptions options = perform_options();
   key_ = key_after(key_, signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
   if (chosen_) key_ = key_after(key_, options.replay.step_s);
-  performances_ = stages_.run("replay", key_, [&] { return retarget::perform_calmly(target_.performer, signals_, options); });
+  performances_ = stages_.run("replay", key_, [&] { return retarget::perform_calmly(performer(), signals_, options); });
 }
 
 void Conversion::write() {
-  const retarget::Performer& performer = target_.performer;
+  const retarget::Performer& performer = target_.performer;  // on its flat ground
   stages_.run("files", [&] {
     writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.effort, settings_.nodes)));
     writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
@@ -368,6 +382,7 @@ void Conversion::write() {
     if (performer.wobble.is_on()) writer_.write("wobble.bin", io::wobble_bytes(performer.wobble));
     writer_.write("rig.bin", io::rig_bytes(rig()));
     writer_.write("signals.json", signals_text_);
+    if (!scene_text_.empty()) writer_.write(io::kCreatureSceneFile, scene_text_);
     io::write_skinned_glb(writer_.directory() / "reference.glb",
                           {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance_,
                            &performer.morphs},
@@ -375,7 +390,7 @@ void Conversion::write() {
     return 0;
   });
   target_.report.timing_s = stages_.timing_s;
-  write_outcome(writer_, performer, appearance_, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
+  write_outcome(writer_, this->performer(), appearance_, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
 }
 
 }  // namespace hydrostat::cli

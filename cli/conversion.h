@@ -65,6 +65,12 @@ class Conversion {
 
   void cut_signals();
 
+  /// Into the scene that was asked for; body and signals stay those of the flat ground.
+  void put_in_scene();
+
+  /// As it is let go.
+  const retarget::Performer& performer() const { return in_scene_ ? *in_scene_ : target_.performer; }
+
   void tell_signals();
 
   void let_go();
@@ -90,7 +96,8 @@ class Conversion {
   retarget::Performances performances_;
   bool is_performed_ = false;
   io::Appearance appearance_;
-  std::string target_file_, signals_text_;
+  std::string target_file_, signals_text_, scene_text_;
+  std::optional<retarget::Performer> in_scene_;
 };
 
 }  // namespace hydrostat::cli

@@ -109,6 +109,7 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
   app.add_option("--friction", options.friction, "Coulomb's coefficient of the ground")
       ->check(number_within(0.05, 5))
       ->capture_default_str();
+  app.add_option("--scene", options.scene, "World to let it go in, a TOML file (README, 'A creature's scene')");
   add_wobble_option(app, options.wobble,
                     "Whether flesh swings over what the nodes carry, in the picture alone; auto: where it is seen");
   app.add_option("--seed", options.seed, "Other than 0: the body that is let go differs from the plan by up to 2 % in "

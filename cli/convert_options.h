@@ -14,7 +14,7 @@ constexpr const char *kTet = "tet", *kHex = "hex";
 /// What 'hydrostat convert' was told.
 struct ConvertOptions {
   std::string clip_file, out, clip, root_motion = "auto", limit = "auto", method = "auto", element = kTet, material = "auto",
-              wobble = "auto";
+              wobble = "auto", scene;
   double height = 0;
   int nodes = 0;
   double friction = retarget::CreatureOptions().friction;

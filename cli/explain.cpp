@@ -6,6 +6,7 @@
 
 #include "cli/subcommands.h"
 #include "cli/subject.h"
+#include "io/creature_scene.h"
 #include "retarget/effects.h"
 #include "retarget/simulation.h"
 
@@ -18,8 +19,9 @@ struct ExplainCommand {
   bool json = false;
 };
 
-std::vector<retarget::EffectReport> effects_of(const Subject& subject) {
+std::vector<retarget::EffectReport> effects_of(Subject subject, const std::string& path) {
   if (subject.creature) {
+    io::put_in_own_scene(path, subject.creature->target.performer);
     retarget::ReplayOptions options;
     options.method =
         physics::method_named(io::setting(subject.creature->record, "method", "")).value_or(physics::Method::kExplicit);
@@ -34,7 +36,7 @@ std::vector<retarget::EffectReport> effects_of(const Subject& subject) {
 }
 
 int explain(const ExplainCommand& command) {
-  const std::vector<retarget::EffectReport> effects = effects_of(read_subject(command.subject));
+  const std::vector<retarget::EffectReport> effects = effects_of(read_subject(command.subject), command.subject);
   if (command.json) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
     for (const retarget::EffectReport& effect : effects) {

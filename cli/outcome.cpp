@@ -46,7 +46,7 @@ void write_outcome(io::CreatureWriter& writer, const retarget::Performer& perfor
   const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, wobble);
   io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
                         {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
-                        performer.mesh, performer.scene.body.mass, run.motion, {});
+                        performer.mesh, performer.scene.body.mass, retarget::in_world(performer.world, run.motion, 0), {});
   writer.remove(down ? "replay.glb" : "failed.glb");
   writer.write("report.json", io::report_json(report));
   io::write_performance_page(writer.directory() / "report.html", performer, appearance, signals, performances, report,

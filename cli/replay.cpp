@@ -13,6 +13,7 @@
 #include "cli/outcome.h"
 #include "cli/stages.h"
 #include "cli/wobble_option.h"
+#include "io/creature_scene.h"
 #include "io/gltf_out.h"
 #include "io/load_creature.h"
 #include "io/trace_writer.h"
@@ -30,7 +31,7 @@ constexpr double kLongest = 600;       // [s] of a replay
 constexpr double kFastestPush = 100;   // [m/s] along an axis
 
 struct ReplayCommand {
-  std::string directory, out, trace, wobble;
+  std::string directory, out, scene, trace, wobble;
   AskedAccuracy accuracy;
   AskedLevel level;
   double duration = 0, cycles = 0, trace_rate = 0;
@@ -103,6 +104,24 @@ retarget::PerformOptions perform_options(const ReplayCommand& command, const io:
   return options;
 }
 
+void write_trace(const ReplayCommand& command, const retarget::World& world, const retarget::Trace& trace, int every) {
+  io::write_trace(command.trace, retarget::in_world(world, retarget::thinned(trace, every)));
+}
+
+/// Into the scene that was asked for, else into its own.
+void put_in_scene(const ReplayCommand& command, io::LoadedCreature& creature) {
+  retarget::Performer& performer = creature.target.performer;
+  if (command.scene.empty()) {
+    io::put_in_own_scene(command.directory, performer);
+    return;
+  }
+  std::vector<std::string>& warnings = creature.target.report.warnings;
+  for (const std::string& warning : io::put_in_scene(command.scene, performer)) warnings.push_back(warning);
+}
+
+/// Refuses a scene that cannot be before anything else is done.
+void check_scene(const ReplayCommand& command, io::LoadedCreature creature) { put_in_scene(command, creature); }
+
 /// The motion alone, for -o.
 int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const io::Appearance& appearance,
                  const retarget::Performances& performances) {
@@ -110,7 +129,7 @@ int write_motion(const ReplayCommand& command, const retarget::Performer& perfor
   const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
   const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, retarget::wobble_morphs(performer, run.motion));
   io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
-                        performer.mesh, performer.scene.body.mass, run.motion, {});
+                        performer.mesh, performer.scene.body.mass, retarget::in_world(performer.world, run.motion, 0), {});
   return tell_run(run, command.directory, file.string());
 }
 
@@ -208,6 +227,7 @@ int replay(const ReplayCommand& command) {
   const retarget::Performer& performer = creature.target.performer;
   retarget::PerformOptions options = perform_options(command, creature);
   const WobbleChoice wobble(command.wobble, command.level.is_asked(), command.directory, creature);
+  check_scene(command, creature);
   Levels levels(command, creature, options.replay, stages);
   wobble.plan(creature.target.performer);
   std::optional<ChosenStep> chosen;
@@ -215,6 +235,8 @@ int replay(const ReplayCommand& command) {
     chosen = stages.run("accuracy", [&] { return choose_step(command.accuracy, kCommand, performer, creature.signals, std::nullopt); });
     take_steps(options.replay, chosen->setting);
   }
+  put_in_scene(command, creature);  // levels and accuracy are of the flat ground
+  for (retarget::Push& push : options.replay.pushes) push.delta_v = performer.world.turn.transpose() * push.delta_v;
   std::optional<io::CreatureWriter> writer;
   if (command.out.empty()) writer.emplace(command.directory, io::CreatureWriter::Start::amended);
 
@@ -227,6 +249,7 @@ int replay(const ReplayCommand& command) {
   retarget::Performances performances = perform();
   while (levels.take_better(way_kept(performances.main()), creature)) {
     wobble.plan(creature.target.performer);
+    put_in_scene(command, creature);
     performances = perform();
   }
   while (chosen && !command.open_loop && is_down(performances.main()) &&
@@ -239,7 +262,7 @@ int replay(const ReplayCommand& command) {
   std::vector<std::string>& warnings = creature.target.report.warnings;
   for (const std::string& warning : retarget::feedback_warnings(performances)) warnings.push_back(warning);
   if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
-  if (!command.trace.empty()) io::write_trace(command.trace, retarget::thinned(performances.main().trace, every));
+  if (!command.trace.empty()) write_trace(command, performer.world, performances.main().trace, every);
   const bool is_met = !chosen || chosen->report.is_met();
   if (!command.json) tell_level(creature.target.report.level, command.directory);
   if (!writer) {
@@ -288,6 +311,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   replay_command->add_option("--cycles", command->cycles, "The same in periods of the clip")
       ->check(number_within(0.1, 10000))
       ->excludes(duration);
+  replay_command->add_option("--scene", command->scene, "World to let it go in, a TOML file (README, 'A creature's scene') [the creature's]");
   replay_command->add_flag("--open-loop", command->open_loop, "Leave the corrector out");
   replay_command->add_option("--push", command->pushes, "t=2,dv=0.3:0:0: a force on the whole body for 0.1 s from t [s] on that would "
                                                         "change its velocity by dv [m/s]; may be given several times")

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 14> kOwnFiles{"appearance.bin", "morphs.bin", "creature.toml", "body.json",   "target.bin",
+constexpr std::array<std::string_view, 15> kOwnFiles{"scene.toml",     "appearance.bin", "morphs.bin", "creature.toml", "body.json",   "target.bin",
                                                      "signals.json",   "reference.glb", "replay.glb",  "failed.glb",
                                                      "report.json",    "report.html",   "accuracy.csv", "accuracy.svg",
                                                      "rig.bin"};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/page_obstacle.h"
+
 namespace hydrostat::io {
 namespace {
 
@@ -121,6 +123,22 @@ std::vector<PageContactRow> contact_rows(const retarget::PreparedTarget& prepare
   return rows;
 }
 
+/// Ground and obstacles as the world has them.
+void show_surroundings(const retarget::Performer& performer, const retarget::Motion& motion, PageInput& page) {
+  const retarget::World& world = performer.world;
+  page.has_ground = performer.scene.has_ground;
+  page.ground_normal = world.turn * performer.scene.ground.normal;
+  page.ground_height = (performer.scene.ground.offset + page.ground_normal.dot(world.pivot)) / page.ground_normal.y();
+  for (std::size_t o = 0; o < performer.scene.obstacles.size(); ++o) {
+    physics::ObstacleOf<3> obstacle = performer.scene.obstacles[o];
+    obstacle.place = world.pivot + world.turn * (obstacle.place - world.pivot);
+    obstacle.turn = world.turn * obstacle.turn;
+    retarget::Motion travel = retarget::travel_of(world.moves, static_cast<int>(o), motion.rate_hz, motion.count());
+    travel.frames = world.turn * travel.frames;
+    page.obstacles.push_back(page_obstacle<3>(obstacle, travel, performer.length));
+  }
+}
+
 }  // namespace
 
 void write_performance_page(const std::filesystem::path& path, const retarget::Performer& performer,
@@ -131,9 +149,12 @@ void write_performance_page(const std::filesystem::path& path, const retarget::P
   PageInput page{report, performer.skin, performer.embedding, performer.mesh, {}, {}, {}, 0};
   page.appearance = &appearance;
   page.morphs = &performer.morphs;
-  page.motions.push_back({PageRole::kClip, true, performer.clip_skin});
-  page.motions.push_back({PageRole::kTarget, false, performer.prepared.target});
-  for (const Run& run : runs) page.motions.push_back({run.role, false, run.replay.motion});
+  const double duration_s = longest(runs).report.duration_s;
+  const auto seen = [&](const retarget::Motion& motion) { return retarget::in_world(performer.world, motion, duration_s); };
+  page.motions.push_back({PageRole::kClip, true, seen(performer.clip_skin)});
+  page.motions.push_back({PageRole::kTarget, false, seen(performer.prepared.target)});
+  for (const Run& run : runs) page.motions.push_back({run.role, false, seen(run.replay.motion)});
+  show_surroundings(performer, runs.front().replay.motion, page);
   page.motions[2].morphs = wobble;  // the main run is the first
   using Course = retarget::ReplayCourse;
   page.charts = {com_path(runs),

@@ -7,6 +7,7 @@
 #include "io/fingerprint.h"
 #include "io/scene_seams.h"
 #include "io/scene_shapes.h"
+#include "io/scene_surroundings.h"
 #include "io/toml_reader.h"
 #include "physics/element_body.h"
 #include "physics/element_calibration.h"
@@ -20,16 +21,12 @@ using physics::VectorOf;
 using retarget::ScenarioOf;
 using retarget::StartShape;
 
-constexpr double kSteepest = 80;             // [deg] of the ground
 constexpr double kMostActivation = 0.95;     // of all waves on one constraint: 1 would let it vanish
 constexpr double kLeastPoissonsRatio = 0.25; // of springs
 constexpr double kFriction = 0.8;
-constexpr double kAirDensity = 1.2;          // [kg/m3]
 constexpr double kOrigins = 64;              // [m] between the places that may be the local origin
 const std::string kSprings = "springs";
 const std::vector<std::string> kLaws{kSprings, "stable_neo_hookean", "corotated_linear"};
-const std::vector<std::string> kWishes{"auto", "on", "off"};
-constexpr Within kFrictionRange{.least = 0, .most = 10};
 
 /// Reads the tables of one scene into a scenario.
 template <int Dim>
@@ -47,10 +44,10 @@ class SceneReader {
     if (!root_.tables("seam").empty()) scenario_.fracture = read_seams<Dim>(root_, mesh_, make_body_, scenario_.youngs_modulus);
     for (const TomlReader& wave : root_.tables("activation")) read_wave(wave);
     refuse_vanishing();
-    read_surroundings();
+    read_surroundings<Dim>(root_, scenario_, scene_.warnings);
     for (const TomlReader& clamp : root_.tables("clamp")) read_clamp(clamp);
     const StartShape start = place(*body);
-    for (const TomlReader& push : root_.tables("push")) read_push(push);
+    read_pushes<Dim>(root_, scenario_);
     read_effects(start);
     physics::touch_with_whole_surface(scenario_.scene);
     body->refuse_others();
@@ -198,70 +195,6 @@ class SceneReader {
                         "Let amplitudes and offsets stay below 0.95 together.");
   }
 
-  void read_surroundings() {
-    physics::SceneOf<Dim>& scene = scenario_.scene;
-    scene.gravity = root_.numbers_or("gravity_m_s2", -9.81 * VectorOf<Dim>::UnitY());
-    const std::optional<TomlReader> ground = root_.table("ground");
-    scene.has_ground = ground.has_value();
-    if (ground) {
-      const double slope = radians(ground->number_or("slope_deg", 0, {.least = -kSteepest, .most = kSteepest}));
-      scene.ground.normal = VectorOf<Dim>::Zero();
-      scene.ground.normal[0] = -std::sin(slope);
-      scene.ground.normal[1] = std::cos(slope);
-      scene.ground.offset = ground->number_or("height_m", 0, kPlace) * scene.ground.normal[1] - scene.ground.normal.dot(scenario_.origin);
-      scene.ground.friction = ground->number_or("friction", kFriction, kFrictionRange);
-      ground->refuse_others();
-    }
-    for (const TomlReader& obstacle : root_.tables("obstacle")) read_obstacle(obstacle);
-    if (const std::optional<TomlReader> water = root_.table("water")) {
-      physics::FluidOf<Dim> fluid;
-      if (water->has("level_m")) fluid.level = water->number("level_m", kPlace) - scenario_.origin[1];
-      scene.water = read_fluid(*water, fluid);
-    }
-    if (const std::optional<TomlReader> air = root_.table("air")) {
-      physics::FluidOf<Dim> fluid;
-      fluid.density = kAirDensity;
-      scene.air = read_fluid(*air, fluid);
-    }
-  }
-
-  physics::FluidOf<Dim> read_fluid(const TomlReader& table, physics::FluidOf<Dim> fluid) const {
-    constexpr Within kCoefficient{.least = 0, .most = 100};
-    fluid.density = table.number_or("density_kg_m3", fluid.density, {.least = 0, .most = 1e5, .without_least = true});
-    fluid.velocity = table.numbers_or("velocity_m_s", VectorOf<Dim>::Zero());
-    fluid.drag = table.number_or("drag", fluid.drag, kCoefficient);
-    fluid.drag_along = table.number_or("drag_along", fluid.drag_along, kCoefficient);
-    table.refuse_others();
-    return fluid;
-  }
-
-  void read_obstacle(const TomlReader& table) {
-    physics::ObstacleOf<Dim> obstacle;
-    const std::string mesh = Dim == 3 ? "mesh" : "outline";
-    const std::string shape = table.choice("shape", {"box", "ball", "half_space", mesh});
-    if (shape == "box") {
-      obstacle.shape = physics::BoxOf<Dim>{table.number_or_numbers("size_m", Dim, kLength) / 2};
-    } else if (shape == "ball") {
-      obstacle.shape = physics::Ball{table.number("size_m", kLength) / 2};
-    } else if (shape == mesh) {
-      obstacle.shape = surface_of<Dim>(table, scene_.warnings);
-    }
-    obstacle.place = place_of(table);
-    obstacle.turn = rotation_of<Dim>(table);
-    obstacle.friction = table.number_or("friction", kFriction, kFrictionRange);
-    for (const TomlReader& move : table.tables("move")) {
-      retarget::MoveOf<Dim> moving;
-      moving.obstacle = static_cast<int>(scenario_.scene.obstacles.size());
-      moving.velocity = move.numbers("velocity_m_s", Dim);
-      moving.from_s = move.number_or("from_s", 0, kNotNegative);
-      moving.until_s = move.number_or("until_s", moving.until_s, {.least = moving.from_s, .without_least = true});
-      move.refuse_others();
-      scenario_.moves.push_back(moving);
-    }
-    table.refuse_others();
-    scenario_.scene.obstacles.push_back(std::move(obstacle));
-  }
-
   /// Returns what the body starts as.
   StartShape place(const TomlReader& body) {
     physics::SceneOf<Dim>& scene = scenario_.scene;
@@ -291,21 +224,8 @@ class SceneReader {
 
   void read_effects(StartShape start) {
     physics::SceneOf<Dim>& scene = scenario_.scene;
-    std::map<std::string, retarget::Wish> wishes;
-    double friction = scene.has_ground ? scene.ground.friction : kFriction;
-    if (const std::optional<TomlReader> table = root_.table("effects")) {
-      const auto read = [&](const std::string& name) {
-        const std::string wish = table->choice_or_first(name, kWishes);
-        wishes[name] = wish == "on" ? retarget::Wish::kOn : wish == "off" ? retarget::Wish::kOff : retarget::Wish::kAuto;
-      };
-      read("self_contact");
-      for (const std::string& name : retarget::switchable_effects()) read(name);
-      friction = table->number_or("self_friction", friction, kFrictionRange);
-      table->refuse_others();
-      if (wishes["self_contact"] == retarget::Wish::kOff && table->has("self_friction")) {
-        throw table->refusal("self_friction", "'self_contact' is off, so that nothing rubs", "Leave one of the two out.");
-      }
-    }
+    auto [wishes, friction] =
+        read_wished_effects(root_, retarget::switchable_effects(), scene.has_ground ? scene.ground.friction : kFriction);
     const std::string broken = retarget::plan_effects<Dim>(wishes, scenario_);
     if (!broken.empty()) throw root_.refusal("effects", broken, "Add what it needs, or leave the effect to 'auto'.");
     retarget::SelfContactPlan plan = retarget::plan_self_contact<Dim>(scenario_, start, wishes["self_contact"], friction);
@@ -321,15 +241,6 @@ class SceneReader {
     } else {
       return radians(1) * body.numbers_or("spin_deg_s", Eigen::Vector3d::Zero());
     }
-  }
-
-  void read_push(const TomlReader& table) {
-    retarget::PushOf<Dim> push;
-    push.time_s = table.number("time_s", kNotNegative);
-    push.duration_s = table.number_or("duration_s", push.duration_s, kAboveZero);
-    push.delta_v = table.numbers("delta_v_m_s", Dim);
-    table.refuse_others();
-    scenario_.pushes.push_back(push);
   }
 
   const TomlReader& root_;

@@ -187,6 +187,16 @@ bool cuts_itself(const Eigen::Matrix2Xd& corners) {
   return false;
 }
 
+/// `vertices_m` and `triangles`, as a creature's own scene has them.
+ClosedMeshOf<3> told_surface(const TomlReader& table) {
+  const Eigen::Matrix3Xd vertices = table.lists("vertices_m", 3, kPlace);
+  const Eigen::Matrix3Xi triangles =
+      table.lists("triangles", 3, {.least = 0, .most = static_cast<double>(vertices.cols() - 1)}).cast<int>();
+  const std::string broken = physics::broken_mesh_rule<3>(vertices, triangles);
+  if (!broken.empty()) throw table.refusal("triangles", "the surface is not closed: " + broken, "Give a closed surface.");
+  return {vertices, triangles};
+}
+
 }  // namespace
 
 template <int Dim>
@@ -205,6 +215,7 @@ BlockOf<Dim> rotation_of(const TomlReader& table) {
 template <int Dim>
 ClosedMeshOf<Dim> surface_of(const TomlReader& table, std::vector<std::string>& warnings) {
   if constexpr (Dim == 3) {
+    if (table.has("vertices_m")) return told_surface(table);
     const std::filesystem::path file = std::filesystem::absolute(table.file()).parent_path() / table.text("file");
     const double scale = table.number_or("scale", 1, kLength);
     try {

@@ -16,7 +16,7 @@ constexpr double radians(double degrees) { return degrees * 3.141592653589793238
 template <int Dim>
 physics::BlockOf<Dim> rotation_of(const TomlReader& table);
 
-/// A closed surface: `file` with `scale` in 3D, `outline_m` in 2D; `warnings` receives what of it was mended. Throws Error where it is
+/// A closed surface: `file` with `scale`, or `vertices_m` with `triangles`, in 3D, `outline_m` in 2D; `warnings` receives what of it was mended. Throws Error where it is
 /// not closed or cuts itself.
 template <int Dim>
 physics::ClosedMeshOf<Dim> surface_of(const TomlReader& table, std::vector<std::string>& warnings);

@@ -7,6 +7,8 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kPointLoad = 1e-6, kPatchLoad = 0.01;  // [m g]
+constexpr double kEarth = 9.81;                         // [m/s2]
+constexpr double kFarAway = 1e300;                      // [m]
 constexpr double kStillSpeed = 0.01;                    // of sqrt(g L): a loaded patch that moves faster slides
 
 /// Velocity of a contact point along the ground.
@@ -18,12 +20,27 @@ Eigen::Vector3d level_velocity(const physics::Scene& scene, const physics::State
 }  // namespace
 
 ContactThresholds contact_thresholds(const physics::Scene& scene, double length, double seconds) {
-  const double weight = scene.body.mass.sum() * scene.gravity.norm(), wave_speed = std::sqrt(scene.gravity.norm() * length);
+  const double weight = scene.body.mass.sum() * gravity_unit(scene), wave_speed = std::sqrt(gravity_unit(scene) * length);
   return {kPointLoad * weight * seconds, kPatchLoad * weight * seconds, kStillSpeed * wave_speed};
 }
 
+double gravity_unit(const physics::Scene& scene) {
+  const double gravity = scene.gravity.norm();
+  return gravity > 0 ? gravity : kEarth;
+}
+
 double height_above_ground(const physics::Scene& scene, const physics::State& state, int point) {
-  return scene.ground.normal.dot(scene.contact_points.of(state.x, point)) - scene.ground.offset;
+  const Eigen::Vector3d place = scene.contact_points.of(state.x, point);
+  double height = scene.has_ground ? scene.ground.normal.dot(place) - scene.ground.offset : kFarAway;
+  Eigen::Vector3d normal;
+  for (std::size_t o = 0; o < scene.obstacles.size(); ++o) {
+    const physics::ObstacleOf<3>& obstacle = scene.obstacles[o];
+    Eigen::Vector3d travel = Eigen::Vector3d::Zero();
+    if (state.obstacle_travel.cols() > 0) travel = state.obstacle_travel.col(static_cast<Eigen::Index>(o));
+    if (physics::distance_at_least<3>(obstacle, travel, place) >= height) continue;
+    height = std::min(height, physics::signed_distance<3>(obstacle, travel, place, normal));
+  }
+  return height;
 }
 
 std::vector<ContactState> point_states(const physics::Scene& scene, const physics::State& state,

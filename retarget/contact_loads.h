@@ -14,7 +14,10 @@ struct ContactThresholds {
 /// For a body of length L `length` [m] and control steps of `seconds`.
 ContactThresholds contact_thresholds(const physics::Scene& scene, double length, double seconds);
 
-/// Height [m] of a contact point above the ground.
+/// The strength of gravity, or the Earth's where there is none [m/s2]: a unit for forces and speeds.
+double gravity_unit(const physics::Scene& scene);
+
+/// Height [m] of a contact point above what is nearest: the ground or an obstacle; negative inside. Far away where there is neither.
 double height_above_ground(const physics::Scene& scene, const physics::State& state, int point);
 
 /// What contact points do, P: `impulse` 3 x P [N s] is what the ground gave each of them in the control step that ends in

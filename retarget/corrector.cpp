@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "retarget/contact_cones.h"
+#include "retarget/contact_loads.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -21,10 +22,10 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
     : scene_(scene),
       muscles_(muscles),
       options_(options),
-      speed_unit_(std::sqrt(scene.gravity.norm() * length)),
+      speed_unit_(std::sqrt(gravity_unit(scene) * length)),
       limit_(limit),
       // Stiff against the body's own springs, soft enough for the factor: a point gives half a thousandth of L under the weight.
-      contact_stiffness_(scene.body.mass.sum() * scene.gravity.norm() / (5e-4 * length)),
+      contact_stiffness_(scene.body.mass.sum() * gravity_unit(scene) / (5e-4 * length)),
       node_shares_(shares_of_nodes(scene.body, options.node_weight / speed_unit_)),
       responses_(scene, muscles, options.horizon_s, contact_stiffness_, node_shares_),
       forces_(scene.body) {
@@ -73,7 +74,7 @@ double Corrector::weigh_momentum(const physics::State& state, double grip) {
 
 /// The mean of each foot in the air, on its way to where it can catch the body.
 void Corrector::weigh_feet(const physics::State& state, const physics::State& reference,
-                           const std::vector<const Patch*>& in_air) {
+                           const ContactNow& contact) {
   const physics::Body& body = scene_.body;
   const Eigen::Vector3d up = scene_.ground.normal, com = physics::centre_of_mass(body, reference.x);
   const double height = std::max(0.0, up.dot(com) - scene_.ground.offset), gravity = scene_.gravity.norm();
@@ -83,10 +84,12 @@ void Corrector::weigh_feet(const physics::State& state, const physics::State& re
   const Eigen::Vector3d step = options_.step * (ahead - up.dot(ahead) * up);
   const Eigen::Index last = responses_.velocities().cols();
   Eigen::Index row = 6;
-  for (const Patch* foot : in_air) {
+  for (std::size_t k = 0; k < contact.in_air.size(); ++k) {
+    const Patch* foot = contact.in_air[k];
     auto mean = weighted_.middleRows<3>(row);
     mean.setZero();
     Eigen::Vector3d error = -step;
+    if (!contact.lift.empty()) error -= contact.lift[k] * up;
     const double share = 1 / static_cast<double>(foot->points.size());
     for (const int p : foot->points) {
       for (int c = 0; c < scene_.contact_points.nodes.rows(); ++c) {
@@ -127,8 +130,8 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
 
   // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.
   weighted_.resize(6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
-  weigh_feet(state, reference, contact.in_air);
-  const double weight = body.mass.sum() * scene_.gravity.norm();
+  weigh_feet(state, reference, contact);
+  const double weight = body.mass.sum() * gravity_unit(scene_);
   cone_rows(scene_, contact.touching, contact.bearing, contact.force / weight,
             (contact_stiffness_ * options_.horizon_s / weight) * responses_.velocities(), previous_, cones_);
   deviation_ += (state.x - reference.x).reshaped() / options_.settle_s;

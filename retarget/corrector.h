@@ -20,6 +20,7 @@ struct CorrectorOptions {
   double foot_weight = 4;       // of the rows of a foot in the air
   double foot_settle_s = 0.1;   // tau of a foot in the air
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
+  double clearance = 0.02;      // of L: over what a foot in the air is to step onto or across
   double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
   int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error,
   int hurried_every = 2;        // while it is below hurried_error; above that it is made at each call
@@ -32,6 +33,7 @@ struct ContactNow {
   Eigen::Matrix3Xd force;              // 3 x P [N], of the control step before
   std::vector<bool> bearing;           // P: by plan it bears load now and until the horizon's end
   std::vector<const Patch*> in_air;    // patches on legs that touch nothing; they must outlive the call
+  std::vector<double> lift;            // [m] of each of them: by how much what lies ahead raises it over its reference; empty: none
   double grip = 1;  // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
                     // friction sets the ground's sideways force, and pushing harder only slips more
 };
@@ -66,7 +68,7 @@ class Corrector {
   int calls_for_response() const;
   void find_free_deviation(const physics::State& state, const physics::State& reference);
   double weigh_momentum(const physics::State& state, double grip);
-  void weigh_feet(const physics::State& state, const physics::State& reference, const std::vector<const Patch*>& in_air);
+  void weigh_feet(const physics::State& state, const physics::State& reference, const ContactNow& contact);
 
   const physics::Scene& scene_;
   const Muscles& muscles_;

@@ -6,6 +6,8 @@
 
 #include "physics/elastic_forces.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/performed_scenario.h"
+#include "retarget/simulation.h"
 #include "retarget/wobble_plan.h"
 
 namespace hydrostat::retarget {
@@ -55,9 +57,38 @@ double self_contact_seconds(const physics::Scene& scene, const physics::State& s
   return seconds_between(scene, without, start, options);
 }
 
+EffectReport embedding_of(const Performer& performer, const physics::State& state) {
+  return {"embedding", "on", "the skin follows the nodes of its tets; counted at 60 frames a second, outside the solver",
+          1e3 * seconds_of([&] { embedded_positions(performer.embedding, state.x); }) * kFramesPerSecond};
+}
+
+EffectReport wobble_of(const Performer& performer) {
+  const bool wobbles = performer.wobble.is_on();
+  return {"wobble", wobbles ? "on" : "off", performer.wobble.reason,
+          wobbles ? 1e3 * wobble_seconds(performer) * performer.prepared.target.rate_hz : 0};
+}
+
+/// Of a creature in a scene: what that decided, timed as a scene's effects are.
+std::vector<EffectReport> effects_in_world(const Performer& performer, const ReplayOptions& options) {
+  ScenarioOf<3> scenario = undriven_scenario(performer);
+  scenario.pushes.insert(scenario.pushes.end(), options.pushes.begin(), options.pushes.end());
+  SimulationOptions simulation;
+  simulation.method = options.method;
+  simulation.dt_s = options.step_s;
+  std::vector<EffectReport> effects = effects_of(scenario, simulation);
+  for (EffectReport& effect : effects) {
+    if (effect.name == "embedding") effect = embedding_of(performer, scenario.start);
+    if (effect.name == "wobble") effect = wobble_of(performer);
+    if (effect.name == "fracture") effect.reason = "a creature has no seams; scenes have [[seam]]";
+    if (effect.name == "pushes" && !options.pushes.empty()) effect.reason = "asked for by --push";
+  }
+  return effects;
+}
+
 }  // namespace
 
 std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOptions& options) {
+  if (performer.world.is_told()) return effects_in_world(performer, options);
   const physics::Body& body = performer.scene.body;
   const double substeps = std::round(options.step_s / physics::make_stepper(options.method, performer.scene)->substep(options.step_s));
   const double passes = substeps / options.step_s;  // over the body, per simulated second
@@ -73,9 +104,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
       has_elements ? 0 : seconds_of([&] { physics::add_elastic_forces(springs, state.x, passive, force); });
   const double damping = seconds_of([&] { physics::add_damping_forces(body, state.x, state.v, force); });
   const double gravity = seconds_of([&] { force.colwise() += performer.scene.gravity; });
-  const double embedding = seconds_of([&] { embedded_positions(performer.embedding, state.x); });
-  const bool pushed = !options.pushes.empty(), touches_itself = performer.scene.self_contact.is_on,
-             wobbles = performer.wobble.is_on();
+  const bool pushed = !options.pushes.empty(), touches_itself = performer.scene.self_contact.is_on;
   const double pushing = pushed ? seconds_of([&] { force += state.v; }) : 0;
 
   return {
@@ -96,10 +125,8 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
       {"air_drag", "off", "a creature moves in still air without drag; scenes have [air]", 0},
       {"water", "off", "there is no water", 0},
       {"pushes", pushed ? "on" : "off", pushed ? "asked for by --push" : "none was asked for", ms(pushing * passes)},
-      {"embedding", "on", "the skin follows the nodes of its tets; counted at 60 frames a second, outside the solver",
-       ms(embedding * kFramesPerSecond)},
-      {"wobble", wobbles ? "on" : "off", performer.wobble.reason,
-       wobbles ? ms(wobble_seconds(performer) * performer.prepared.target.rate_hz) : 0},
+      embedding_of(performer, state),
+      wobble_of(performer),
       {"fracture", "off", "a creature has no seams; scenes have [[seam]]", 0},
   };
 }

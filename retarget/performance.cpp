@@ -36,11 +36,17 @@ FeedForward target_lengths(const Performer& performer, double limit) {
 
 Replay run(const Performer& performer, const physics::Scene& plant, const FeedForward& feed_forward, double limit,
            const ReplayOptions& options) {
-  const ReplayInput input{plant,        performer.scene,       performer.prepared,
+  std::optional<physics::Scene> without_obstacles;
+  if (!performer.scene.obstacles.empty()) without_obstacles.emplace(performer.scene).obstacles.clear();
+  const physics::Scene& model = without_obstacles ? *without_obstacles : performer.scene;
+  const ReplayInput input{plant,        model,                 performer.prepared,
                           performer.muscles, feed_forward,     performer.clip_points,
                           performer.scene.contact_points, performer.clip_rise, performer.length,
                           performer.size, limit};
-  return replay(input, options);
+  ReplayOptions in_world = options;
+  in_world.pushes.insert(in_world.pushes.end(), performer.world.pushes.begin(), performer.world.pushes.end());
+  in_world.moves = performer.world.moves;
+  return replay(input, in_world);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "retarget/replay.h"
 #include "retarget/signal_set.h"
 #include "retarget/wobble.h"
+#include "retarget/world.h"
 
 namespace hydrostat::retarget {
 
@@ -26,6 +27,7 @@ struct Performer {
   double clip_rise = 0;    // [m] of the centre of mass of the clip's nodes, over its height at the start
   double length = 1, size = 1;  // L and D [m]
   std::string self_contact_reason = "nobody asked for it";  // why the scene has it or not
+  World world = {};  // around it, beside what the scene has
 };
 
 /// Which free runs are wanted, and how.
@@ -59,8 +61,8 @@ Variation variation_of(unsigned seed, double most = PerformOptions().variation);
 /// The scene with another body of the same shape.
 physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation);
 
-/// Lets the creature go as often as wanted, on the same body, contact and solver. The signals play from their coefficients with all
-/// layers.
+/// Lets the creature go as often as wanted, on the same body, contact and solver, with the pushes of its world beside those of the
+/// options. The signals play from their coefficients with all layers. The corrector's model knows of no obstacles.
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// The same, on calmer feedback where the closed loop falls: effort is 4, 16, then 64 times as dear, and the first with which

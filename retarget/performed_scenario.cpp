@@ -13,12 +13,22 @@ SignalSet with_harmonics(const SignalSet& signals, int harmonics) {
   return fewer;
 }
 
-ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& signals, int harmonics) {
+ScenarioOf<3> undriven_scenario(const Performer& performer) {
   ScenarioOf<3> scenario;
   scenario.scene = performer.scene;
+  scenario.pushes = performer.world.pushes;
+  scenario.moves = performer.world.moves;
+  scenario.decisions = performer.world.decisions;
   scenario.length = performer.length;
   scenario.size = performer.size;
   scenario.self_contact_reason = performer.self_contact_reason;
+  MotionCurve(performer.prepared.target).at(0, scenario.start.x, scenario.start.v);
+  if (!performer.prepared.target.loop) scenario.start.v.setZero();
+  return scenario;
+}
+
+ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& signals, int harmonics) {
+  ScenarioOf<3> scenario = undriven_scenario(performer);
   MotionCurve(performer.prepared.target).at(0, scenario.start.x, scenario.start.v);
   const bool is_cut = harmonics > 0 && harmonics < signals.activation.harmonics();
   const auto player =

@@ -8,6 +8,9 @@ namespace hydrostat::retarget {
 /// The same with fewer harmonics of activations and forces.
 SignalSet with_harmonics(const SignalSet& signals, int harmonics);
 
+/// A creature at the target's start in its world, as a scenario without any drive.
+ScenarioOf<3> undriven_scenario(const Performer& performer);
+
 /// The open loop of a creature as a scenario: its body let go at the target's start, driven by its signals, of which
 /// `harmonics` are kept (0: all). Performer and signals are copied.
 ScenarioOf<3> performed_scenario(const Performer& performer, const SignalSet& signals, int harmonics = 0);

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <optional>
 
+#include "physics/effect.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/fall.h"
+#include "retarget/obstacle_moves.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
 #include "retarget/stride_feedback.h"
+#include "retarget/uneven_ground.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -35,6 +38,10 @@ ContactNow first_contact(const ContactSchedule& contacts) {
     if (contacts.touching(p, 0)) now.touching[static_cast<std::size_t>(p)] = ContactState::kStick;
   }
   return now;
+}
+
+std::optional<physics::Scene> moving_plant(const ReplayInput& input, const ReplayOptions& options) {
+  return options.moves.empty() ? std::nullopt : std::optional(input.scene);
 }
 
 /// One free simulation, from control step to control step.
@@ -63,10 +70,14 @@ class Run {
   const long steps_, steps_per_frame_;
   const Eigen::VectorXd mass_shares_;
   const MotionCurve curve_;
+  std::optional<physics::Scene> moving_;  // a copy of the plant, where obstacles change their velocities
+  const physics::Scene& plant_;
   const std::unique_ptr<physics::Stepper> stepper_;
+  const std::vector<std::unique_ptr<physics::EffectOf<3>>> effects_;
   Corrector corrector_;
   Observer observer_;
   ReferenceGlide glide_;
+  std::optional<UnevenGround> uneven_;  // where there is more than the plan's ground
   StrideFeedback stride_;
   ReturnMap return_map_;
   long cycles_ = 0;  // of a loop, whose ends were seen
@@ -98,7 +109,10 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       steps_per_frame_(std::max(1L, std::lround(1 / (target_.rate_hz * control_s_)))),
       mass_shares_(input.scene.body.mass / input.scene.body.mass.sum()),
       curve_(target_),
-      stepper_(physics::make_stepper(options.method, input.scene)),
+      moving_(moving_plant(input, options)),
+      plant_(moving_ ? *moving_ : input.scene),
+      stepper_(physics::make_stepper(options.method, plant_)),
+      effects_(physics::plan_effects(plant_)),
       corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
       observer_(options.observation, control_s_),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
@@ -116,6 +130,8 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       thresholds_(contact_thresholds(input.scene, input.length, control_s_)),
       metrics_(input, control_s_, steps_, state_),
       frames_{column(state_.x)} {
+  state_.obstacle_travel.setZero(3, static_cast<Eigen::Index>(plant_.obstacles.size()));
+  if (!plant_.obstacles.empty()) uneven_.emplace(plant_, input.prepared, input.length, options.corrector.clearance);
   curve_.at(0, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   if (!options.trace) return;
@@ -143,7 +159,8 @@ void Run::look_at_contacts() {
       contact_.bearing[point] = bears;
       touches = touches || contact_.touching[point] != ContactState::kOff;
     }
-    if (plan.patches[k].on_leg && !touches) contact_.in_air.push_back(&plan.patches[k]);
+    const bool is_caught = uneven_ && touches && planned[now] == ContactState::kOff;  // by an edge: it is to get over it
+    if (plan.patches[k].on_leg && (!touches || is_caught)) contact_.in_air.push_back(&plan.patches[k]);
   }
   // In flight nothing holds the trunk against a leg that swings.
   if (contact_.in_air.size() == plan.patches.size()) contact_.in_air.clear();
@@ -168,6 +185,7 @@ ReturnMap::Answers Run::ask_model() const {
   alone.duration_s = 2 * target_.duration_s();
   alone.observation = {};
   alone.pushes.clear();
+  alone.moves.clear();
   alone.trace = false;
   Run first(believed, alone);
   ReturnMap::Answers errors;
@@ -206,6 +224,11 @@ void Run::control() {
   stride_.follow(fit_, control_s_);
   keep_way();
   look_at_contacts();
+  if (uneven_) {
+    uneven_->look(time_s_, control_s_, fit_, seen);
+    uneven_->lift(contact_.in_air, contact_.lift);
+    uneven_->apply(physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
+  }
   input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
   stride_.apply(time_s_ + 0.5 * control_s_, activation_);
   return_map_.apply(time_s_ + 0.5 * control_s_, activation_);
@@ -232,8 +255,10 @@ physics::Termination Run::advance() {
   for (int k = 0; k < options_.steps_per_control; ++k) {
     const double begin = time_s_ + k * options_.step_s;
     const Eigen::Vector3d pushed = pushed_velocity(options_.pushes, begin, begin + options_.step_s);
-    const bool has_effect = !pushed.isZero(0);
+    const bool has_effect = !effects_.empty() || !pushed.isZero(0);
     if (has_effect) effect_ = (pushed / options_.step_s) * input_.scene.body.mass.transpose();
+    for (const auto& effect : effects_) effect->add_forces(options_.step_s, state_, effect_);
+    if (moving_) move_obstacles(options_.moves, begin, options_.step_s, moving_->obstacles);
     activate((k + 0.5) / options_.steps_per_control);
     mean_activation_ += activation_ / options_.steps_per_control;
     termination = stepper_->step(options_.step_s, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
@@ -284,7 +309,7 @@ Replay Run::play() {
       break;
     }
     measure(step);
-    if (fall_watch_.has_fallen(input_.scene.ground, fit_, control_s_)) {
+    if (plant_.has_ground && fall_watch_.has_fallen(plant_.ground, fit_, control_s_)) {
       fall_ = Fall{time_s_ - fall_watch_.seconds(), fall_cause(input_, state_, reference_, fit_, activation_, time_s_)};
     }
   }

@@ -8,6 +8,7 @@
 #include "retarget/prepare.h"
 #include "retarget/push.h"
 #include "retarget/run_report.h"
+#include "retarget/scenario.h"
 #include "retarget/trace.h"
 
 namespace hydrostat::retarget {
@@ -21,6 +22,7 @@ struct ReplayOptions {
   CorrectorOptions corrector;
   Observation observation;  // of the corrector
   std::vector<Push> pushes;
+  std::vector<MoveOf<3>> moves = {};  // of the plant's obstacles
   bool trace = false;
 };
 
@@ -52,7 +54,8 @@ struct Replay {
   physics::Termination termination = physics::Termination::kDone;
 };
 
-/// Lets the body go: from the target's first state on nothing acts but its own activations, gravity, contact and the pushes.
+/// Lets the body go: from the target's first state on nothing acts but its own activations, gravity, contact, the scene's water and
+/// air, and the pushes.
 Replay replay(const ReplayInput& input, const ReplayOptions& options);
 
 /// min(15 cycles, 10 s) of a loop; a one-shot with a second more to stand on its feet.

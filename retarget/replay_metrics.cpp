@@ -10,6 +10,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kBuzz = 10;             // [Hz]
+constexpr double kNothingBelow = 1e299;  // [m]: as high is a patch where there is no ground
 constexpr double kLeastRange = 1e-3;     // of L: a clip whose skin moves less within the body has no style to lose
 constexpr double kLeastShareOfPoints = 0.1;  // of those that move most: what the least ratio leaves below it
 
@@ -60,7 +61,7 @@ ReplayMetrics::ReplayMetrics(const ReplayInput& input, double control_s, long mo
     : input_(input),
       control_s_(control_s),
       length_(input.length),
-      weight_(input.scene.body.mass.sum() * input.scene.gravity.norm()),
+      weight_(input.scene.body.mass.sum() * gravity_unit(input.scene)),
       period_s_(input.prepared.target.duration_s()),
       rest_volume_(physics::volume(input.scene.body, input.scene.body.rest)),
       thresholds_(contact_thresholds(input.scene, input.length, control_s)),
@@ -191,7 +192,7 @@ void ReplayMetrics::watch_patches(const ControlStep& step) {
     patch_loaded_[k] = is_loaded;
     const ContactState moving = load.speed > thresholds_.sliding_speed ? ContactState::kSlide : ContactState::kStick;
     course_.patch_state[k].push_back(is_loaded ? moving : ContactState::kOff);
-    if (plan.state[k][frame] == ContactState::kStick) sole_gap_.add(std::max(0.0, load.gap));
+    if (plan.state[k][frame] == ContactState::kStick && load.gap < kNothingBelow) sole_gap_.add(std::max(0.0, load.gap));
   }
   course_.slip_speed[steps_ - 1] = fastest;
 }

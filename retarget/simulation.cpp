@@ -9,6 +9,7 @@
 #include "physics/self_contact.h"
 #include "physics/tearing.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/obstacle_moves.h"
 #include "retarget/simulation_record.h"
 
 namespace hydrostat::retarget {
@@ -62,7 +63,6 @@ class Course {
   bool is_split() const { return activation_split_.size() > 0; }
   const Eigen::VectorXd& activation_now() const { return is_split() ? activation_split_ : activation_; }
   void drive(double time_s);
-  void set_velocities(double begin);
   void let_go();
   void tear();
   void go_on_anew();
@@ -151,17 +151,6 @@ typename Course<Dim>::Energy Course<Dim>::energy() const {
           -scene_.gravity.dot(state_.x * body_.mass)};
 }
 
-/// Gives the obstacles the velocities of the step that begins then: a move counts with the share of the step that it lasts.
-template <int Dim>
-void Course<Dim>::set_velocities(double begin) {
-  if (scenario_.moves.empty()) return;
-  for (const MoveOf<Dim>& move : scenario_.moves) scene_.obstacles[static_cast<std::size_t>(move.obstacle)].velocity.setZero();
-  for (const MoveOf<Dim>& move : scenario_.moves) {
-    const double seconds = std::min(begin + options_.dt_s, move.until_s) - std::max(begin, move.from_s);
-    if (seconds > 0) scene_.obstacles[static_cast<std::size_t>(move.obstacle)].velocity += seconds / options_.dt_s * move.velocity;
-  }
-}
-
 /// From here on another scene is stepped, in which fewer nodes are held.
 template <int Dim>
 void Course<Dim>::let_go() {
@@ -227,7 +216,7 @@ physics::Termination Course<Dim>::step() {
     forces_->set_activation(activation_now());
     work_ += forces_->elastic_energy(state_.x);
   }
-  set_velocities(begin);
+  move_obstacles(scenario_.moves, begin, dt, scene_.obstacles);
   if (begin >= next_release_s_) let_go();
   const VectorOf<Dim> pushed = pushed_velocity(scenario_.pushes, begin, begin + dt);
   const bool has_effect = !effects_.empty() || !pushed.isZero(0);

@@ -1,5 +1,5 @@
 // One free run of the balance bench: a creature, a variant of the corrector, a seed, a push; one row of balance.csv on standard output.
-// tests/balance/run.sh calls it for all of them. Usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json]
+// tests/balance/run.sh calls it for all of them. Usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json|- [SCENE.toml]]
 // SEED draws mass, friction and stiffness within 10 % of the plan and a shove of up to 0.1 m/s at the start; 0 is the plan itself.
 // PUSH is "none" or DIRECTION:PHASE:SPEED, the direction in eighths of a turn, the phase in quarters of a cycle, the speed in m/s.
 #include <cmath>
@@ -11,6 +11,7 @@
 #include <random>
 #include <sstream>
 
+#include "io/creature_scene.h"
 #include "io/load_creature.h"
 #include "retarget/error.h"
 #include "retarget/performance.h"
@@ -42,7 +43,8 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
                                              {"horizon", &options.horizon_s}, {"cone", &options.cone_weight},
                                              {"foot", &options.foot_weight},  {"foot_settle", &options.foot_settle_s},
                                              {"step", &options.step},         {"ahead", &options.step_ahead},
-                                             {"calm", &options.calm},         {"calm_error", &options.calm_error}, {"hurried_error", &options.hurried_error},
+                                             {"clearance", &options.clearance}, {"hurried_error", &options.hurried_error},
+                                             {"calm", &options.calm},         {"calm_error", &options.calm_error},
                                              {"slope", &slope.degrees},       {"side", &slope.side},
                                              {"noise", &replay.observation.noise_m},
                                              {"delay", &replay.observation.delay_s}};
@@ -97,7 +99,7 @@ void write_frames(const std::string& file, const retarget::Performer& performer,
 
 int run(int argc, char** argv) {
   if (argc < 6) {
-    std::cerr << "usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json]\n";
+    std::cerr << "usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json|- [SCENE.toml]]\n";
     return 2;
   }
   const std::string directory = argv[1], variant = argv[2], push = argv[4];
@@ -108,6 +110,7 @@ int run(int argc, char** argv) {
   retarget::PerformOptions options;
   Slope slope;
   set_variant(variant, options.replay, slope);
+  if (argc > 7) io::put_in_scene(argv[7], performer);
   slope.tilt(performer.scene.gravity);
   options.replay.duration_s = target.loop ? std::atof(argv[5]) * target.duration_s() : retarget::usual_duration(target);
   options.baselines = false;
@@ -125,7 +128,7 @@ int run(int argc, char** argv) {
   std::printf("%s,%d,%.4g,%.3f,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g\n", r.fell ? "fell" : "up", target.loop ? 1 : 0, r.cycles,
               r.fell ? r.fall_time_s : r.duration_s, r.shape_rms_length, r.clip_shape_rms_length, r.drift_per_cycle_length,
               r.heading_deg_per_cycle, travel, r.slip_per_stance_length, r.penetration_max_size, r.real_time_factor);
-  if (argc > 6) write_frames(argv[6], performer, replay.motion);
+  if (argc > 6 && argv[6] != std::string("-")) write_frames(argv[6], performer, replay.motion);
   return 0;
 }
 

@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # The balance bench: how long creatures keep their feet, over clips, seeds, pushes and variants of the corrector.
-#   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-j JOBS]
+#   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-w SCENE] [-j JOBS]
 # Writes DIR/balance.csv and DIR/balance.html (default DIR: out/balance). A run that is there is not run again; one that was
-# broken off goes on where it was. -p SPEED adds, for the plan's body, pushes of so many m/s in 8 directions at 4 phases.
+# broken off goes on where it was. -p SPEED adds, for the plan's body, pushes of so many m/s in 8 directions at 4 phases. -w SCENE lets all go in a
+# creature's scene (README, "A creature's scene").
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")")
 assets=${HYDROSTAT_ASSETS:-$project/../shared/assets}
-out=$project/out/balance clips="" variants=usual seeds=20 cycles=50 speed="" jobs=$(nproc)
-while getopts o:c:v:s:n:p:j: option; do
+out=$project/out/balance clips="" variants=usual seeds=20 cycles=50 speed="" scene="" jobs=$(nproc)
+while getopts o:c:v:s:n:p:w:j: option; do
   case $option in
     o) out=$(realpath -m -- "$OPTARG") ;;
     c) clips=$OPTARG ;;
@@ -15,6 +16,7 @@ while getopts o:c:v:s:n:p:j: option; do
     s) seeds=$OPTARG ;;
     n) cycles=$OPTARG ;;
     p) speed=$OPTARG ;;
+    w) scene=$(realpath -- "$OPTARG") ;;
     j) jobs=$OPTARG ;;
     *) exit 2 ;;
   esac
@@ -37,6 +39,13 @@ cmake --preset release > /dev/null
 cmake --build --preset release --target hydrostat balance_run -j "$jobs" | tail -n 1
 mkdir -p -- "$out/creatures" "$out/rows" "$out/frames"
 program=$(sha256sum build/release/hydrostat | cut -c 1-16)
+
+# Rows of another scene would be other rows.
+world=$([ -z "$scene" ] || sha256sum "$scene" | cut -c 1-16)
+if [ "$(cat "$out/scene" 2> /dev/null)" != "$world" ]; then
+  rm -f -- "$out/rows/"* "$out/frames/"*
+  echo "$world" > "$out/scene"
+fi
 
 names=()
 while IFS='|' read -r name file options; do
@@ -80,11 +89,13 @@ run_case() {  # out name,variant,seed,push,cycles
   local row=$1/rows/$2 frames=()
   [ ! -f "$row" ] || return 0
   IFS=, read -r name variant seed push cycles <<< "$2"
+  frames=(-)
   [ "$seed" != 1 ] || frames=("$1/frames/$name,$variant.json")
-  build/release/tests/balance_run "$1/creatures/$name" "$variant" "$seed" "$push" "$cycles" "${frames[@]}" > "$row.part"
+  build/release/tests/balance_run "$1/creatures/$name" "$variant" "$seed" "$push" "$cycles" "${frames[@]}" ${scene:+"$scene"} > "$row.part"
   mv -- "$row.part" "$row"
 }
 export -f run_case
+export scene
 cases | xargs -d '\n' -P "$jobs" -I CASE bash -c 'run_case "$@"' _ "$out" CASE
 
 {

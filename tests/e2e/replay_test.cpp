@@ -132,6 +132,62 @@ TEST_F(Replay, PushesByAForceThatTheTraceTells) {
   EXPECT_EQ(audit.correction_ns, 0);
 }
 
+/// A side wind on a slope knee-deep in water, and a ball that rolls along.
+constexpr const char* kWorld = R"([ground]
+slope_deg = 5.0
+[water]
+level_m = 0.15
+[air]
+velocity_m_s = [12.0, 0.0, 3.0]
+[[obstacle]]
+shape = "ball"
+size_m = 0.4
+position_m = [1.0, 0.3, 0.2]
+[[obstacle.move]]
+velocity_m_s = [-1.0, -0.1, 0.0]
+[[push]]
+time_s = 0.2
+delta_v_m_s = [0.0, 0.0, 0.1]
+)";
+
+TEST_F(Replay, InAWorldBooksAllThatActsOnTheBody) {
+  io::write_file(directory_.path / "world.toml", kWorld);
+  const TraceAudit audit = traced("--duration 1 --scene world.toml");
+  EXPECT_LE(audit.momentum_mg, 1e-6);
+  EXPECT_LE(audit.angular_mgl, 1e-3);  // the moment of gravity is taken at the row's middle
+  EXPECT_GT(audit.effect_mg, 0.05);
+  EXPECT_EQ(audit.correction_ns, 0);
+}
+
+TEST_F(Replay, GoesInTheSceneThatTheCreatureWasMadeWith) {
+  io::write_file(directory_.path / "world.toml", kWorld);
+  const std::string flat = motion_bytes(creature_);
+  convert(directory_.path, kSmallClip, "creature", std::string(kSmallOptions) + "--scene world.toml");
+  const std::string motion = motion_bytes(creature_);
+  EXPECT_NE(motion, flat);
+  for (const char* name : {"ground", "obstacles", "water", "air_drag", "pushes"}) {
+    EXPECT_EQ(effect_of(creature_, name)["state"], "on") << name;
+  }
+  EXPECT_GT(effect_of(creature_, "water")["ms_per_sim_s"], 0);
+  fs::remove(directory_.path / "world.toml");
+  replay("");
+  EXPECT_EQ(motion_bytes(creature_), motion);
+  const Outcome told = hydrostat_in(directory_.path, "explain creature");
+  EXPECT_NE(told.out.find("water         on"), std::string::npos) << told.out;
+  EXPECT_EQ(hydrostat_in(directory_.path, "bench effects creature -o bench --duration 0.1").exit_code, 0);
+  const std::string rows = io::read_file(directory_.path / "bench" / "effects.csv");
+  for (const char* row : {"\nnone,", "\nobstacles,", "\nwater,", "\nair_drag,", "\npushes,", "\nall,"}) {
+    EXPECT_NE(rows.find(row), std::string::npos) << row << rows;
+  }
+  io::write_file(directory_.path / "bad.toml", "[body]\nshape = \"cube\"\n");
+  const Outcome refused = replay("-o motion.glb --scene bad.toml");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+  convert(directory_.path, kSmallClip, "creature", kSmallOptions);
+  EXPECT_EQ(motion_bytes(creature_), flat);
+  EXPECT_FALSE(fs::exists(creature_ / "scene.toml"));
+}
+
 TEST_F(Replay, PutsAFallIntoFailedGlb) {
   const std::string blow = "--push t=0.3,dv=20:0:0";
   const Outcome aside = replay("-o motion.glb " + blow);

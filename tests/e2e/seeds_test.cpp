@@ -36,6 +36,13 @@ TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
         << "seed " << seed << ": what carries the body without signals?";
   }
   EXPECT_GE(good, kLeastShare * seeds);
+  // The last of them climbs, too.
+  const std::string slope = std::string(HYDROSTAT_SAMPLES) + "/scenes/slope_for_a_trot.toml";
+  const Outcome climbed = hydrostat_in(directory.path, "replay creature --quiet --cycles 5 -o up.glb --scene " + in_quotes(slope));
+  EXPECT_EQ(climbed.exit_code, 0) << climbed.err;
+  const std::size_t travel = climbed.out.find("travel ");
+  ASSERT_NE(travel, std::string::npos) << climbed.out;
+  EXPECT_NEAR(std::stod(climbed.out.substr(travel + 7)), 0.435, 0.02) << climbed.out;  // L a cycle
 }
 
 }  // namespace

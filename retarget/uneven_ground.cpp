@@ -1,0 +1,145 @@
+#include "retarget/uneven_ground.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kHighestStep = 0.1;   // per L
+constexpr double kTouched = 1e-4;      // per L: as near to a surface a ray has met it
+constexpr double kUneven = 2e-3;       // per L: less is no step
+constexpr double kSmooth = 0.1;        // [s] in which the reference follows the ground
+constexpr double kNarrow = 0.1;        // per L: feet that stand nearer to each other tell little of a slope
+constexpr int kMostMarches = 64;
+
+/// The outermost of a patch's points to four sides, in the target's first frame.
+std::vector<int> outermost(const Patch& patch, const Eigen::Ref<const Eigen::Matrix3Xd>& places) {
+  std::vector<int> chosen;
+  for (const Eigen::Vector3d& side : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0), Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+    chosen.push_back(*std::max_element(patch.points.begin(), patch.points.end(), [&](int a, int b) {
+      return side.dot(places.col(a)) < side.dot(places.col(b));
+    }));
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+}  // namespace
+
+UnevenGround::UnevenGround(const physics::Scene& scene, const PreparedTarget& plan, double length, double clearance)
+    : scene_(scene),
+      plan_(plan),
+      length_(length),
+      clearance_(clearance),
+      points_(point_motion(scene.contact_points, plan.target)),
+      curve_(points_) {
+  for (std::size_t k = 0; k < plan.contacts.patches.size(); ++k) {
+    const Patch& patch = plan.contacts.patches[k];
+    if (patch.on_leg) feet_.push_back({&patch, k, outermost(patch, points_.at(0))});
+  }
+}
+
+double UnevenGround::height_at(const Eigen::Vector3d& place, const physics::State& state) const {
+  const double ground = scene_.has_ground ? scene_.ground.offset : 0;
+  Eigen::Vector3d at(place.x(), ground + kHighestStep * length_, place.z()), normal;
+  for (int march = 0; march < kMostMarches && at.y() > ground; ++march) {
+    double nearest = at.y() - ground;
+    for (std::size_t o = 0; o < scene_.obstacles.size(); ++o) {
+      Eigen::Vector3d travel = Eigen::Vector3d::Zero();
+      if (state.obstacle_travel.cols() > 0) travel = state.obstacle_travel.col(static_cast<Eigen::Index>(o));
+      if (physics::distance_at_least<3>(scene_.obstacles[o], travel, at) >= nearest) continue;
+      nearest = std::min(nearest, physics::signed_distance<3>(scene_.obstacles[o], travel, at, normal));
+    }
+    if (nearest < kTouched * length_) return march == 0 ? 0 : at.y() - ground;  // a wall
+    at.y() -= nearest;
+  }
+  return 0;
+}
+
+/// 0 where by plan it stands.
+long UnevenGround::frames_to_landing(const Foot& foot, double time_s) const {
+  const std::vector<ContactState>& planned = plan_.contacts.state[foot.index];
+  const Eigen::Index now = frame_at(plan_.target, time_s);
+  const Eigen::Index count = plan_.target.count();
+  for (Eigen::Index ahead = 0; ahead < count; ++ahead) {
+    if (!plan_.target.loop && now + ahead >= count) return 0;
+    if (planned[static_cast<std::size_t>((now + ahead) % count)] != ContactState::kOff) return ahead;
+  }
+  return 0;
+}
+
+/// The top under the outermost points of a foot, as the target has them at a time.
+double UnevenGround::highest(const Foot& foot, double time_s, const RigidFit& fit, const physics::State& state) const {
+  Eigen::Matrix3Xd x, v;
+  curve_.at(time_s, x, v);
+  double highest = 0;
+  for (const int p : foot.points) highest = std::max(highest, height_at(fit.rotation * (x.col(p) - fit.mean_a) + fit.mean_b, state));
+  return highest;
+}
+
+void UnevenGround::look_ahead(Foot& foot, double time_s, double seconds, const RigidFit& fit, const physics::State& state) {
+  double here = 0;
+  foot.place.setZero();
+  for (const int p : foot.points) {
+    const Eigen::Vector3d place = scene_.contact_points.of(state.x, p);
+    here = std::max(here, height_at(place, state));
+    foot.place += place / static_cast<double>(foot.points.size());
+  }
+  const long ahead = frames_to_landing(foot, time_s);
+  double landing = here, most = here;
+  if (ahead > 0) {
+    const double rate = plan_.target.rate_hz;
+    landing = highest(foot, time_s + static_cast<double>(ahead) / rate, fit, state);
+    most = std::max(most, landing);
+    for (long f = 2; f < ahead; f += 2) most = std::max(most, highest(foot, time_s + static_cast<double>(f) / rate, fit, state));
+  }
+  const bool is_step = most > std::min(here, landing) + kUneven * length_;
+  foot.lift = most + (is_step ? clearance_ * length_ : 0);
+  const double share = is_first_ ? 1 : 1 - std::exp(-seconds / kSmooth);
+  foot.ground += share * (landing - foot.ground);
+}
+
+void UnevenGround::look(double time_s, double seconds, const RigidFit& fit, const physics::State& state) {
+  centre_ = fit.mean_b;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (Foot& foot : feet_) {
+    look_ahead(foot, time_s, seconds, fit, state);
+    const Eigen::Vector3d row(1, foot.place.x() - centre_.x(), foot.place.z() - centre_.z());
+    normal += row * row.transpose();
+    right += foot.ground * row;
+  }
+  is_first_ = false;
+  if (feet_.empty()) return;
+  normal.diagonal().tail<2>().array() += std::pow(kNarrow * length_, 2);
+  plane_ = normal.ldlt().solve(right);
+}
+
+double UnevenGround::plane_at(const Eigen::Vector3d& place) const {
+  return plane_[0] + plane_[1] * (place.x() - centre_.x()) + plane_[2] * (place.z() - centre_.z());
+}
+
+void UnevenGround::apply(const Eigen::Vector3d& com, physics::State& reference) const {
+  if (plane_.isZero(0)) return;
+  const Eigen::Vector3d up = Eigen::Vector3d(-plane_[1], 1, -plane_[2]).normalized(), axis = Eigen::Vector3d::UnitY().cross(up);
+  const double sine = axis.norm();
+  const Eigen::Matrix3d tilt = sine > 0 ? Eigen::AngleAxisd(std::asin(sine), axis / sine).toRotationMatrix() : Eigen::Matrix3d::Identity();
+  for (Eigen::Index i = 0; i < reference.x.cols(); ++i) {
+    const Eigen::Vector3d arm = reference.x.col(i) - com, speed = reference.v.col(i);
+    reference.x.col(i) = com + Eigen::Vector3d(0, plane_[0], 0) + tilt * arm;
+    reference.v.col(i) = tilt * speed;
+  }
+}
+
+void UnevenGround::lift(const std::vector<const Patch*>& feet, std::vector<double>& lifts) const {
+  lifts.clear();
+  for (const Patch* patch : feet) {
+    const auto foot = std::find_if(feet_.begin(), feet_.end(), [&](const Foot& f) { return f.patch == patch; });
+    lifts.push_back(foot == feet_.end() ? 0 : foot->lift - plane_at(foot->place));
+  }
+}
+
+}  // namespace hydrostat::retarget

@@ -14,6 +14,7 @@
 #include "io/fingerprint.h"
 #include "io/gltf_out.h"
 #include "io/signals_file.h"
+#include "io/path_file.h"
 #include "io/stage_records.h"
 #include "io/wobble_file.h"
 #include "retarget/com_path.h"
@@ -101,6 +102,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
                      {"method", report.accuracy.method},
                      {"friction", options.friction},
                      {"wobble", options.wobble},
+                     {"polish", options.polish},
                      {"seed", std::int64_t{options.seed}}};
   for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
   if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
@@ -113,6 +115,14 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   if (effort != 1) record.settings.emplace_back("corrector_effort", effort);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
+}
+
+retarget::PolishReport polish_report(int rounds, const retarget::Performances& before, const retarget::Performances& after) {
+  const auto stays_up = [](const retarget::Performances& runs) {
+    const retarget::ReplayReport& open = runs.open_loop->report;
+    return open.fell ? open.fall_time_s : open.duration_s;
+  };
+  return {rounds, before.main().report.correction_rms, after.main().report.correction_rms, stays_up(before), stays_up(after)};
 }
 
 Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
@@ -343,6 +353,7 @@ void Conversion::let_go() {
     perform();
   }
   if (!choice_key_.empty()) stages_.cache().store("accuracy", choice_key_, record_of_choice(*chosen_));
+  if (wants_polish(options_) && !is_down(performances_.main())) polish();
   add_warnings(retarget::feedback_warnings(performances_));
   if (chosen_) target_.report.accuracy = told(*chosen_);
   report_replays(performances_, target_.report);
@@ -363,11 +374,41 @@ retarget::PerformOptions Conversion::perform_options() const {
   return result;
 }
 
-void Conversion::perform() {
+void Conversion::perform(const std::string& stage) {
   const retarget::PerformOptions options = perform_options();
   key_ = key_after(key_, signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
   if (chosen_) key_ = key_after(key_, options.replay.step_s);
-  performances_ = stages_.run("replay", key_, [&] { return retarget::perform_calmly(performer(), signals_, options); });
+  performances_ = stages_.run(stage, key_, [&] { return retarget::perform_calmly(performer(), signals_, options); });
+}
+
+void Conversion::follow(const retarget::NominalPath& path) {
+  target_.performer.path = path;
+  if (in_scene_) in_scene_->path = path;
+}
+
+void Conversion::polish() {
+  retarget::PerformOptions plan = perform_options();
+  plan.seed = 0;
+  key_ = key_after(key_, "polish");
+  const retarget::Polished polished =
+      stages_.run("polish", key_, [&] { return retarget::polish(target_.performer, signals_, plan); });  // outside a scene
+  if (!polished.is_better()) return;
+  const retarget::SignalSet solved = signals_;
+  const retarget::Performances before = performances_;
+  signals_.activation = polished.signals.activation;
+  signals_.force = polished.signals.force;
+  follow(polished.path);
+  signals_text_ = io::signals_text(signals_);
+  perform("polished_replay");
+  if (is_down(performances_.main())) {
+    signals_ = solved;
+    performances_ = before;
+    follow({});
+    signals_text_ = io::signals_text(signals_);
+    return;
+  }
+  performances_.effort *= before.effort;
+  target_.report.polish = polish_report(polished.report.rounds, before, performances_);
 }
 
 void Conversion::write() {
@@ -379,6 +420,7 @@ void Conversion::write() {
     writer_.write("target.bin", target_file_);
     if (!performer.morphs.targets.empty()) writer_.write("morphs.bin", io::morphs_bytes(performer.morphs));
     if (!appearance_.parts.empty()) writer_.write("appearance.bin", io::appearance_bytes(appearance_));
+    if (target_.report.polish) writer_.write("path.bin", io::path_bytes(target_));
     if (performer.wobble.is_on()) writer_.write("wobble.bin", io::wobble_bytes(performer.wobble));
     writer_.write("rig.bin", io::rig_bytes(rig()));
     writer_.write("signals.json", signals_text_);

@@ -77,7 +77,13 @@ class Conversion {
 
   retarget::PerformOptions perform_options() const;
 
-  void perform();
+  void perform(const std::string& stage = "replay");
+
+  /// Lets the signals take over what the corrector does in every cycle, and the creature go again.
+  void polish();
+
+  /// Where the polished signals lead.
+  void follow(const retarget::NominalPath& path);
 
   void write();
 

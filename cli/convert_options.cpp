@@ -70,6 +70,11 @@ retarget::CreatureOptions creature_options(const ConvertOptions& options) {
   return result;
 }
 
+bool wants_polish(const ConvertOptions& options) {
+  const std::string& grade = options.accuracy.grade;
+  return options.polish == "on" || (options.polish == "auto" && (grade == "standard" || grade == "final"));
+}
+
 double wished_limit(const ConvertOptions& options) {
   return options.limit == "auto" ? 0 : parse_number(options.limit, kLeastLimit, kMostLimit, "hydrostat convert", "--limit");
 }
@@ -112,6 +117,10 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
   app.add_option("--scene", options.scene, "World to let it go in, a TOML file (README, 'A creature's scene')");
   add_wobble_option(app, options.wobble,
                     "Whether flesh swings over what the nodes carry, in the picture alone; auto: where it is seen");
+  app.add_option("--polish", options.polish,
+                 "Whether the signals learn from replays what the corrector does in every cycle; auto: for --accuracy standard and final")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->capture_default_str();
   app.add_option("--seed", options.seed, "Other than 0: the body that is let go differs from the plan by up to 2 % in "
                                                        "mass, friction and stiffness, drawn from this number")
       ->capture_default_str();

@@ -14,7 +14,7 @@ constexpr const char *kTet = "tet", *kHex = "hex";
 /// What 'hydrostat convert' was told.
 struct ConvertOptions {
   std::string clip_file, out, clip, root_motion = "auto", limit = "auto", method = "auto", element = kTet, material = "auto",
-              wobble = "auto", scene;
+              wobble = "auto", polish = "auto", scene;
   double height = 0;
   int nodes = 0;
   double friction = retarget::CreatureOptions().friction;
@@ -30,6 +30,8 @@ void add_convert_options(CLI::App& app, ConvertOptions& options);
 
 /// Throw UsageError where options contradict each other.
 retarget::CreatureOptions creature_options(const ConvertOptions& options);
+/// Whether the signals are to be polished.
+bool wants_polish(const ConvertOptions& options);
 /// Of |activation - 1|; 0: automatic.
 double wished_limit(const ConvertOptions& options);
 

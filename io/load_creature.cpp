@@ -2,6 +2,7 @@
 
 #include "io/body_file.h"
 #include "io/creature_directory.h"
+#include "io/path_file.h"
 #include "io/signals_file.h"
 #include "io/wobble_file.h"
 #include "io/write_file.h"
@@ -78,6 +79,8 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
     loaded.target.performer.morphs =
         parse_morphs(read_file(morphs_file), morphs_file.string(), loaded.target.performer.skin.vertices.cols());
   }
+  const std::filesystem::path path_file = creature / "path.bin";
+  if (std::filesystem::exists(path_file)) parse_path(read_file(path_file), path_file.string(), loaded.target);
   loaded.target.performer.wobble = load_wobble(creature, loaded);
   retarget::SelfContactPlan plan = retarget::plan_self_contact(loaded.target.performer);
   loaded.target.performer.scene.self_contact = std::move(plan.settings);

@@ -15,8 +15,8 @@ struct LoadedCreature {
   Appearance appearance;
 };
 
-/// Reads creature.toml, body.json, target.bin, signals.json and, where there are any, appearance.bin, morphs.bin and wobble.bin; the cache is not needed. Throws Error where a file is missing,
-/// damaged, or does not belong to the others.
+/// Reads creature.toml, body.json, target.bin, signals.json and, where there are any, appearance.bin, morphs.bin, path.bin and wobble.bin; the
+/// cache is not needed. Throws Error where a file is missing, damaged, or does not belong to the others.
 LoadedCreature load_creature(const std::filesystem::path& creature);
 
 /// Reads rig.bin, which other levels of detail are made from. Throws Error as above.

@@ -185,6 +185,14 @@ void fill(Group& group, const retarget::LevelReport& level) {
   if (level.budget_ms > 0) group.add("budget_ms", level.budget_ms);
 }
 
+void fill(Group& group, const retarget::PolishReport& polish) {
+  group.add("rounds", polish.rounds);
+  group.add("correction_rms_before", polish.correction_rms_before);
+  group.add("correction_rms_after", polish.correction_rms_after);
+  group.add("open_loop_s_before", polish.open_loop_s_before);
+  group.add("open_loop_s_after", polish.open_loop_s_after);
+}
+
 void fill(Group& group, const retarget::AccuracyReport& accuracy) {
   group.add("method", accuracy.method);
   group.add("element", accuracy.element);
@@ -250,6 +258,7 @@ std::string report_json(const retarget::RunReport& report) {
     json["effects"].push_back(group_json("effects." + effect.name, effect, warnings));
   }
   json["accuracy"] = group_json("accuracy", report.accuracy, warnings);
+  if (report.polish) json["polish"] = group_json("polish", *report.polish, warnings);
   if (report.level) json["level"] = group_json("level", *report.level, warnings);
   json["timing_s"] = group_json("timing_s", report.timing_s, warnings);
   json["warnings"] = warnings;

@@ -71,6 +71,23 @@ Eigen::MatrixXd target_measures(const physics::Body& body, const Motion& target)
   return measures;
 }
 
+/// The nominal path on the level: of its nodes as of what lies there in the solved creature.
+Motion carried_offset(const Motion& solved, const Places& places) {
+  Motion carried = solved;
+  carried.frames.resize(places.nodes.cols() * 3, solved.count());
+  for (Eigen::Index f = 0; f < solved.count(); ++f) {
+    const Eigen::Map<const Eigen::Matrix3Xd> from = solved.at(f);
+    for (Eigen::Index i = 0; i < places.nodes.cols(); ++i) carried.at(f).col(i) = from(Eigen::all, places.nodes.col(i)) * places.weights.col(i);
+  }
+  return carried;
+}
+
+NominalPath carried_path(const Performer& solved, const Rig& rig, const Performer& level, const Eigen::MatrixXd& bone_weights) {
+  if (solved.path.is_empty()) return {};
+  const Places places = locate(solved.mesh, rig.bone_weights, level.mesh.nodes, bone_weights);
+  return {carried_offset(solved.path.place, places), carried_offset(solved.path.velocity, places)};
+}
+
 SignalSet carried_signals(const Performer& solved, const SignalSet& signals, const Rig& rig, const Performer& level) {
   const physics::Body& body = level.scene.body;
   const Eigen::MatrixXd activation = signal::synthesise_samples(signals.activation, signals.samples()).transpose();
@@ -131,6 +148,7 @@ Level at_level(const Performer& solved, const SignalSet& signals, const Rig& rig
   performer.scene = creature.scene;
   performer.muscles = make_muscles(creature.scene.body, rig.skeleton, creature.mesh.bone_weights);
   performer.prepared = carried_target(solved, rig, creature);
+  performer.path = carried_path(solved, rig, performer, creature.mesh.bone_weights);
   performer.clip_points = carried_clip_points(solved, creature.contacts);
   SelfContactPlan plan = plan_self_contact(performer);
   performer.scene.self_contact = std::move(plan.settings);

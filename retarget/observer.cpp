@@ -3,11 +3,6 @@
 #include <cmath>
 
 namespace hydrostat::retarget {
-namespace {
-
-constexpr double kDrawEvery = 0.1;  // [s]
-
-}  // namespace
 
 Observer::Observer(const Observation& observation, double control_s)
     : observation_(observation),
@@ -30,19 +25,12 @@ const physics::State& Observer::see(const physics::State& state) {
   if (static_cast<long>(past_.size()) > delay_steps_ + 1) past_.pop_front();
   seen_ = past_.front();
   if (observation_.noise_m == 0) return seen_;
-  const Eigen::Index nodes = state.x.cols();
-  if (to_.size() == 0) draw(to_, nodes);
-  if (share_ >= 1) {
-    from_ = to_;
-    draw(to_, nodes);
-    share_ -= 1;
-  }
-  // From draw to draw along a half cosine, whose mean square over the way is 3/4 of a draw's: made up for.
-  const double scale = std::sqrt(4.0 / 3);
-  const double angle = M_PI * share_, s = scale * (1 - std::cos(angle)) / 2;
-  seen_.x += (scale - s) * from_ + s * to_;
-  seen_.v += (scale * M_PI / 2 / kDrawEvery * std::sin(angle)) * (to_ - from_);
-  share_ += control_s_ / kDrawEvery;
+  const bool is_first = to_.size() == 0;
+  draw(from_, state.x.cols());
+  seen_.x += from_;
+  if (is_first) to_ = seen_.x;
+  seen_.v = (seen_.x - to_) / control_s_;
+  to_ = seen_.x;
   return seen_;
 }
 

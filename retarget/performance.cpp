@@ -35,14 +35,14 @@ FeedForward target_lengths(const Performer& performer, double limit) {
 }
 
 Replay run(const Performer& performer, const physics::Scene& plant, const FeedForward& feed_forward, double limit,
-           const ReplayOptions& options) {
+           const ReplayOptions& options, const NominalPath* path = nullptr) {
   std::optional<physics::Scene> without_obstacles;
   if (!performer.scene.obstacles.empty()) without_obstacles.emplace(performer.scene).obstacles.clear();
   const physics::Scene& model = without_obstacles ? *without_obstacles : performer.scene;
   const ReplayInput input{plant,        model,                 performer.prepared,
                           performer.muscles, feed_forward,     performer.clip_points,
                           performer.scene.contact_points, performer.clip_rise, performer.length,
-                          performer.size, limit};
+                          performer.size, limit, path};
   ReplayOptions in_world = options;
   in_world.pushes.insert(in_world.pushes.end(), performer.world.pushes.begin(), performer.world.pushes.end());
   in_world.moves = performer.world.moves;
@@ -84,16 +84,18 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
   const physics::Scene plant = varied_scene(performer.scene, variation_of(options.seed, options.variation));
   ReplayOptions baseline = options.replay;
   baseline.correct = baseline.trace = false;
+  baseline.lesson = nullptr;
   Performances result;
   const auto run_baselines = [&] {
     if (!options.baselines) return;
     result.naive = run(performer, plant, target_lengths(performer, signals.limit), signals.limit, baseline);
-    if (options.closed_loop) result.open_loop = run(performer, plant, signals_of(signals), signals.limit, baseline);
+    if (options.closed_loop) result.open_loop = run(performer, plant, signals_of(signals), signals.limit, baseline, &performer.path);
   };
   auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, run_baselines);
   ReplayOptions main = options.replay;
   main.correct = options.closed_loop;
-  (options.closed_loop ? result.closed_loop : result.open_loop) = run(performer, plant, signals_of(signals), signals.limit, main);
+  (options.closed_loop ? result.closed_loop : result.open_loop) = 
+      run(performer, plant, signals_of(signals), signals.limit, main, &performer.path);
   beside.get();
   return result;
 }
@@ -119,14 +121,15 @@ Performances perform_calmly(const Performer& performer, const SignalSet& signals
 double substep_error(const Performer& performer, const SignalSet& signals, const ReplayOptions& options) {
   ReplayOptions coarse = options;
   coarse.correct = coarse.trace = false;
+  coarse.lesson = nullptr;
   coarse.duration_s = std::min(performer.prepared.target.duration_s(), kErrorSeconds);
   const double substep = physics::make_stepper(options.method, performer.scene)->substep(options.step_s);
   const int halves = 2 * static_cast<int>(std::lround(options.step_s / substep));
   ReplayOptions fine = coarse;
   fine.step_s = options.step_s / halves;
   fine.steps_per_control = options.steps_per_control * halves;
-  const Replay a = run(performer, performer.scene, signals_of(signals), signals.limit, coarse);
-  const Replay b = run(performer, performer.scene, signals_of(signals), signals.limit, fine);
+  const Replay a = run(performer, performer.scene, signals_of(signals), signals.limit, coarse, &performer.path);
+  const Replay b = run(performer, performer.scene, signals_of(signals), signals.limit, fine, &performer.path);
   const Eigen::Index frames = std::min(a.motion.count(), b.motion.count());
   const double nodes = static_cast<double>(a.motion.frames.rows()) / 3 * static_cast<double>(frames);
   return (a.motion.frames.leftCols(frames) - b.motion.frames.leftCols(frames)).norm() / std::sqrt(nodes) / performer.length;

@@ -4,6 +4,7 @@
 
 #include "retarget/control_mesh.h"
 #include "retarget/morphs.h"
+#include "retarget/nominal_path.h"
 #include "retarget/replay.h"
 #include "retarget/signal_set.h"
 #include "retarget/wobble.h"
@@ -20,6 +21,7 @@ struct Performer {
   physics::Scene scene;
   Muscles muscles;
   PreparedTarget prepared;
+  NominalPath path;        // of the polished signals
   Motion clip_points;      // the contact points as the clip has them, 3P x F
   Motion clip_skin;        // all of the skin likewise, thinned for the eye, 3V x F
   MovingMorphs morphs;     // that the skin wears over what the body carries

@@ -7,10 +7,12 @@
 #include "physics/effect.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/fall.h"
+#include "retarget/nominal_path.h"
 #include "retarget/obstacle_moves.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
+#include "retarget/state_estimate.h"
 #include "retarget/stride_feedback.h"
 #include "retarget/uneven_ground.h"
 
@@ -19,10 +21,14 @@ namespace {
 
 Eigen::Map<const Eigen::VectorXd> column(const Eigen::Matrix3Xd& points) { return {points.data(), points.size()}; }
 
-/// The target's first state; what is played once begins at rest.
-physics::State first_state(const Motion& target, const MotionCurve& curve) {
+/// Where the signals take the body.
+NominalPath path_of(const ReplayInput& input) { return input.path ? *input.path : NominalPath(); }
+
+/// The path's first state; what is played once begins at rest.
+physics::State first_state(const Motion& target, const MotionCurve& curve, NominalPathCurve& path) {
   physics::State state;
   curve.at(0, state.x, state.v);
+  path.apply(0, state);
   if (!target.loop) state.v.setZero();
   return state;
 }
@@ -56,7 +62,10 @@ class Run {
   void keep_way();
   ReturnMap::Answers ask_model() const;
   WayError go_for_a_cycle(const ReturnMap::Handles& handles);
+  const physics::State& estimate();
+  void look_at_way(const physics::State& seen, double time_s);
   void control();
+  void take_note(const physics::State& seen);
   void activate(double share_of_step);
   physics::Termination advance();
   void write_trace(long row);
@@ -72,10 +81,12 @@ class Run {
   const MotionCurve curve_;
   std::optional<physics::Scene> moving_;  // a copy of the plant, where obstacles change their velocities
   const physics::Scene& plant_;
+  NominalPathCurve path_;
   const std::unique_ptr<physics::Stepper> stepper_;
   const std::vector<std::unique_ptr<physics::EffectOf<3>>> effects_;
   Corrector corrector_;
   Observer observer_;
+  StateEstimate estimate_;
   ReferenceGlide glide_;
   std::optional<UnevenGround> uneven_;  // where there is more than the plan's ground
   StrideFeedback stride_;
@@ -85,6 +96,7 @@ class Run {
   double time_s_ = 0, busy_s_ = 0;
   Eigen::VectorXd correction_;                  // of the muscles
   physics::State state_, reference_, glided_;
+  physics::State path_then_;                    // when what is seen was
   RigidFit fit_;                                // from reference_ to state_
   Eigen::VectorXd activation_;                  // E, of a solver step
   Eigen::VectorXd mean_activation_;             // E, of a control step
@@ -111,15 +123,17 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       curve_(target_),
       moving_(moving_plant(input, options)),
       plant_(moving_ ? *moving_ : input.scene),
+      path_(path_of(input)),
       stepper_(physics::make_stepper(options.method, plant_)),
       effects_(physics::plan_effects(plant_)),
       corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
       observer_(options.observation, control_s_),
+      estimate_(options.observation, control_s_, input.scene.gravity.norm()),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
-      state_(first_state(target_, curve_)),
+      state_(first_state(target_, curve_, path_)),
       activation_(input.scene.body.edge_count()),
       mean_activation_(activation_.size()),
       feedback_(Eigen::VectorXd::Zero(activation_.size())),
@@ -134,6 +148,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
   if (!plant_.obstacles.empty()) uneven_.emplace(plant_, input.prepared, input.length, options.corrector.clearance);
   curve_.at(0, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
+  if (options.lesson) options.lesson->make_room(activation_.size(), state_.x.size(), steps_);
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);
   input.feed_forward(0, mean_activation_);
@@ -180,13 +195,14 @@ void Run::keep_way() {
 ReturnMap::Answers Run::ask_model() const {
   const ReplayInput believed{input_.model,        input_.model,     input_.prepared,    input_.muscles,
                              input_.feed_forward, input_.clip_skin, input_.skin_points, input_.clip_rise,
-                             input_.length,       input_.size,      input_.limit};
+                             input_.length,       input_.size,      input_.limit,    input_.path};
   ReplayOptions alone = options_;
   alone.duration_s = 2 * target_.duration_s();
   alone.observation = {};
   alone.pushes.clear();
   alone.moves.clear();
   alone.trace = false;
+  alone.lesson = nullptr;
   Run first(believed, alone);
   ReturnMap::Answers errors;
   errors.col(0) = first.go_for_a_cycle(ReturnMap::trial(0));
@@ -209,15 +225,48 @@ WayError Run::go_for_a_cycle(const ReturnMap::Handles& handles) {
     if (advance() == physics::Termination::kDiverged) return WayError::Constant(std::nan(""));
     look_at_body();
   }
+  look_at_way(state_, time_s_);
   return return_map_.way_error(fit_, cycles_ + 1);
+}
+
+/// Where the body is, as far as can be told by what is seen of it.
+const physics::State& Run::estimate() {
+  const physics::State& seen = observer_.see(state_);
+  const double then_s = std::max(0.0, time_s_ - static_cast<double>(observer_.delay_steps()) * control_s_);
+  curve_.at(then_s, path_then_.x, path_then_.v);
+  path_.apply(then_s, path_then_);
+  curve_.at(time_s_, reference_.x, reference_.v);
+  path_.apply(time_s_, reference_);
+  return estimate_.next(seen, path_then_, reference_);
+}
+
+/// How far what is seen of the body is from where it would be by the signals alone.
+void Run::look_at_way(const physics::State& seen, double time_s) {
+  curve_.at(time_s, reference_.x, reference_.v);
+  path_.apply(time_s, reference_);
+  fit_ = best_rigid_fit(reference_.x, seen.x, mass_shares_);
+}
+
+/// What this control step teaches about the path.
+void Run::take_note(const physics::State& seen) {
+  Lesson& lesson = *options_.lesson;
+  const auto step = std::lround(time_s_ / control_s_);
+  if (step >= lesson.time_s.size()) return;
+  const long cycle = target_.loop ? static_cast<long>(std::floor(time_s_ / target_.duration_s() + 1e-9)) : 0;
+  const Eigen::Matrix3d back =
+      (after_cycles(target_, cycle).linear().transpose() * Eigen::AngleAxisd(-glide_.yaw, Eigen::Vector3d::UnitY())).eval();
+  lesson.time_s[step] = time_s_;
+  input_.feed_forward(time_s_ + 0.5 * control_s_, mean_activation_);
+  lesson.added.col(step) = activation_ - mean_activation_;
+  lesson.place.col(step) = (back * (seen.x - glided_.x)).reshaped();
+  lesson.velocity.col(step) = (back * (seen.v - glided_.v)).reshaped();
 }
 
 /// The correction for the coming control step, by what is seen of the body.
 void Run::control() {
   if (!options_.correct) return;
-  const physics::State& seen = options_.observation.is_exact() ? state_ : observer_.see(state_);
-  curve_.at(std::max(0.0, time_s_ - static_cast<double>(observer_.delay_steps()) * control_s_), reference_.x, reference_.v);
-  fit_ = best_rigid_fit(reference_.x, seen.x, mass_shares_);
+  const physics::State& seen = options_.observation.is_exact() ? state_ : estimate();
+  look_at_way(seen, time_s_);
   glided_ = reference_;
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
@@ -236,6 +285,7 @@ void Run::control() {
   corrector_.correct(seen, glided_, contact_, activation_);
   correction_ = corrector_.muscles_now();
   feedback_ += activation_;
+  if (options_.lesson) take_note(seen);
 }
 
 /// The activations at a time within the control step: signals that are held would come in jerks, which shake feet loose that hold
@@ -328,6 +378,7 @@ Replay Run::finish(long rows) {
     report.fall_cause = fall_->cause;
   }
   result_.course = metrics_.course();
+  if (options_.lesson) options_.lesson->cut(std::min<Eigen::Index>(rows - 1, options_.lesson->time_s.size()));
   result_.motion.rate_hz = target_.rate_hz;
   result_.motion.frames.resize(state_.x.size(), static_cast<Eigen::Index>(frames_.size()));
   for (std::size_t f = 0; f < frames_.size(); ++f) result_.motion.frames.col(static_cast<Eigen::Index>(f)) = frames_[f];

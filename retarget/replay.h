@@ -13,6 +13,9 @@
 
 namespace hydrostat::retarget {
 
+struct Lesson;
+struct NominalPath;
+
 struct ReplayOptions {
   double duration_s = 9;
   double step_s = 1.0 / 480;    // outer step of the solver, over which activations are held
@@ -24,6 +27,7 @@ struct ReplayOptions {
   std::vector<Push> pushes;
   std::vector<MoveOf<3>> moves = {};  // of the plant's obstacles
   bool trace = false;
+  Lesson* lesson = nullptr;  // to be filled by a replay that is corrected
 };
 
 /// What a replay is compared with and driven by. All refer to one body; everything must outlive the call.
@@ -37,6 +41,7 @@ struct ReplayInput {
   physics::ContactPoints skin_points;     // the same points in the body
   double clip_rise = 0;                   // [m] of the centre of mass of the imported clip: apex_rise of its com_path
   double length = 1, size = 1, limit = 0.3;
+  const NominalPath* path = nullptr;      // where the feed-forward takes the body; none: to the target
 };
 
 /// Time courses of one replay, one entry a control step.

@@ -59,6 +59,13 @@ struct ReplayReport {
   double apex_rise_length = 0, clip_apex_rise_length = 0;  // of the COM over its height at the start, per L
 };
 
+/// What polish made of the signals: RMS of the correction, and how long the open loop stays up, at most as long as it was let go.
+struct PolishReport {
+  int rounds = 0;  // replays from which it learned
+  double correction_rms_before = 0, correction_rms_after = 0;
+  double open_loop_s_before = 0, open_loop_s_after = 0;
+};
+
 /// Faces of a seam that broke in one step.
 struct BreakReport {
   double time_s = 0;
@@ -122,6 +129,7 @@ struct RunReport {
   std::optional<SimulationReport> simulation;  // in place of all that tells of a clip
   std::vector<EffectReport> effects;
   AccuracyReport accuracy;
+  std::optional<PolishReport> polish;  // of signals that were polished
   std::optional<LevelReport> level;
   std::vector<std::pair<std::string, double>> timing_s;  // per stage, in order
   std::vector<std::string> warnings;

@@ -184,6 +184,36 @@ TEST(Convert, GivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(motion_bytes(one), motion_bytes(two));
 }
 
+/// What of the correction comes back in every cycle is the signals' own then, and they keep the creature up by themselves for longer.
+TEST(Convert, PolishesTheSignals) {
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "creature";
+  convert(directory.path, kSmallClip, "creature", kSmallOptions);
+  const json before = report_of(creature)["replay"];
+  EXPECT_FALSE(report_of(creature).contains("polish"));
+  ASSERT_EQ(convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--polish on").exit_code, 0);
+  const json report = report_of(creature), after = report["replay"], told = report["polish"];
+  EXPECT_TRUE(fs::exists(creature / "path.bin"));
+  EXPECT_EQ(told["correction_rms_before"], before["closed_loop"]["correction_rms"]);
+  EXPECT_EQ(told["correction_rms_after"], after["closed_loop"]["correction_rms"]);
+  EXPECT_LT(told["correction_rms_after"], told["correction_rms_before"].get<double>() / 3);
+  ASSERT_TRUE(before["open_loop"]["fell"]);
+  EXPECT_EQ(told["open_loop_s_before"], before["open_loop"]["fall_time_s"]);
+  EXPECT_GE(told["open_loop_s_after"], 2 * told["open_loop_s_before"].get<double>());
+  EXPECT_LT(after["closed_loop"]["shape_rms_length"], before["closed_loop"]["shape_rms_length"].get<double>() + 1e-3);
+  EXPECT_EQ(after["closed_loop"]["external_assist_mg"], 0);
+  EXPECT_EQ(report["signals"]["harmonics"], json::parse(io::read_file(creature / "signals.json"))["harmonics"]);
+
+  const std::string motion = motion_bytes(creature);  // what is loaded again goes the same way
+  hydrostat_in(directory.path, "replay creature --quiet");
+  EXPECT_EQ(motion_bytes(creature), motion);
+  EXPECT_EQ(report_of(creature)["polish"], told);
+  io::write_file(creature / "path.bin", "of another kind");
+  const Outcome damaged = hydrostat_in(directory.path, "replay creature --quiet");
+  EXPECT_EQ(damaged.exit_code, 1);
+  EXPECT_NE(damaged.err.find("path.bin"), std::string::npos) << damaged.err;
+}
+
 /// Which entries of the stage cache are the same in both.
 std::set<std::string> stages_kept(const std::set<std::string>& before, const std::set<std::string>& after) {
   std::set<std::string> kept;

@@ -56,14 +56,14 @@ TEST(Perform, RunsOnlyWhatIsWanted) {
   EXPECT_EQ(open.main().report.correction_rms, 0);
 }
 
-/// Feedback that is too eager for what it knows, late and roughly, shakes the body down: the search ends at the first effort that does not.
+/// Feedback that is too eager for how late it knows shakes the body down: the search ends at the first effort that does not.
 TEST(PerformCalmly, TakesTheFirstEffortThatStaysUp) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1.5);
   EXPECT_EQ(perform_calmly(performer, signals, options).effort, 1);
   const auto falls = [](const Performances& runs) { return runs.main().report.fell; };
-  options.replay.observation = {0.1 * performer.length, 0.1};
+  options.replay.observation.delay_s = 0.1;
   ASSERT_TRUE(falls(perform(performer, signals, options)));
   const Performances calm = perform_calmly(performer, signals, options);
   EXPECT_FALSE(falls(calm));

@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <map>
+#include <sstream>
 
 #include "tests/e2e/made_creature.h"
 #include "tests/e2e/trace_audit.h"
+#include "tests/sanitizers.h"
 
 namespace hydrostat {
 namespace {
@@ -396,6 +398,43 @@ TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
   hydrostat_in(directory.path, "replay creature --quiet");
   EXPECT_EQ(motion_bytes(creature), motion);
   EXPECT_NE(io::read_file(creature / "report.html").find("What accuracy costs: "), std::string::npos);
+}
+
+/// The nodes of the rows of accuracy.csv, the largest number.
+int most_nodes_tried(const fs::path& creature) {
+  std::istringstream lines(io::read_file(creature / "accuracy.csv"));
+  std::string line;
+  std::getline(lines, line);
+  int most = 0;
+  while (std::getline(lines, line)) {
+    std::istringstream fields(line);
+    std::string method, element, nodes;
+    std::getline(std::getline(std::getline(fields, method, ','), element, ','), nodes, ',');
+    most = std::max(most, std::stoi(nodes));
+  }
+  return most;
+}
+
+TEST(Convert, TakesACoarserMeshWhereItKeepsTheErrorAndRemembersIt) {
+  if (kSanitized) GTEST_SKIP() << "minutes with sanitizers";
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "creature";
+  const Outcome outcome = convert(directory.path, kSmallClip, "creature", "--max-error 4%");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json report = report_of(creature);
+  const int nodes = report["body"]["nodes"];
+  EXPECT_LT(nodes, 0.8 * most_nodes_tried(creature));
+  EXPECT_LE(report["accuracy"]["estimated_error_length"], 0.04);
+  EXPECT_LE(report["replay"]["closed_loop"]["world_rms_length"], 0.05);
+  EXPECT_NE(outcome.out.find("on " + std::to_string(nodes) + " nodes"), std::string::npos) << outcome.out;
+  const std::string motion = motion_bytes(creature);
+  ASSERT_EQ(convert(directory.path, kSmallClip, "creature", "--max-error 4%").exit_code, 0);
+  const json again = report_of(creature);
+  EXPECT_FALSE(again["timing_s"].contains("accuracy"));
+  EXPECT_EQ(again["accuracy"], report["accuracy"]);
+  EXPECT_EQ(motion_bytes(creature), motion);
+  hydrostat_in(directory.path, "replay creature --quiet");
+  EXPECT_EQ(motion_bytes(creature), motion);
 }
 
 TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {

@@ -37,7 +37,7 @@ TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
   }
   EXPECT_GE(good, kLeastShare * seeds);
   // The last of them climbs, too.
-  const std::string slope = std::string(HYDROSTAT_SAMPLES) + "/scenes/slope_for_a_trot.toml";
+  const std::string slope = std::string(HYDROSTAT_SAMPLES) + "/worlds/slope_for_a_trot.toml";
   const Outcome climbed = hydrostat_in(directory.path, "replay creature --quiet --cycles 5 -o up.glb --scene " + in_quotes(slope));
   EXPECT_EQ(climbed.exit_code, 0) << climbed.err;
   const std::size_t travel = climbed.out.find("travel ");

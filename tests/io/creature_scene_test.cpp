@@ -126,6 +126,18 @@ TEST_F(CreatureScenes, StandAloneInTheCreature) {
   EXPECT_EQ(before.scene.gravity, after.scene.gravity);
 }
 
+TEST_F(CreatureScenes, OfTheSamplesAreRead) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(HYDROSTAT_SAMPLES) / "worlds")) {
+    SCOPED_TRACE(entry.path().string());
+    retarget::Performer performer = plain;
+    EXPECT_TRUE(put_in_scene(entry.path(), performer).empty());
+    EXPECT_TRUE(performer.world.is_told());
+    ++count;
+  }
+  EXPECT_EQ(count, 2);
+}
+
 TEST_F(CreatureScenes, RefuseWhatIsNotOfTheWorldOrCannotBe) {
   const auto expect = [&](const std::string& text, const std::string& where, const std::string& what) {
     const std::string told = refused(text);

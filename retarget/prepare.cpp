@@ -19,7 +19,7 @@ constexpr double kTouching = 0.003;    // per D: points of a contact that ended 
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
 constexpr double kOverReach = 1.5;    // times reach: what a clip needs beyond that is held back
 constexpr double kFar = 0.04;         // of L: further no shift should move a clip
-constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet that walk leave with half of it, those of a leap with one to two
+constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
 constexpr double kLeapForces = 0.1;   // share of the forces' cost for a leap that would be moved further
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
@@ -157,15 +157,17 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   ShapeProjector projector(scene, length, options.volume, reach_of(locked, body, options.reach, result.warnings));
   target = project_frames(locked, holds, floor, projector, options.smooth_hz);
   report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
+  double share = 1;  // of the forces' usual cost; where it is less, loads do not fade by themselves before a foot leaves
   const auto remark = [&] {
     const Motion touching = point_motion(scene.contact_points, target);
     mark_touching(touching, kTouching * size, contacts);
-    let_go(touching, kFliesOff * std::sqrt(scene.gravity.norm() * length), contacts);
+    if (share < 1) let_go(touching, kFliesOff * std::sqrt(scene.gravity.norm() * length), contacts);
   };
   remark();
   const Motion before_momentum = target;
   Motion wanted = locked;  // the animator's shape with the shifts so far
-  const double share = options.momentum ? force_share(target, scene, contacts, length, options.support_friction) : 1;
+  if (options.momentum) share = force_share(target, scene, contacts, length, options.support_friction);
+  remark();
   for (int round = 0; options.momentum && round < options.rounds; ++round) {
     const Shift shift = find_shift(target, scene, contacts, length, options.support_friction, 60, share);
     wanted = shifted(wanted, shift, body);

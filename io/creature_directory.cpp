@@ -20,10 +20,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 15> kOwnFiles{"scene.toml",     "appearance.bin", "morphs.bin", "creature.toml", "body.json",   "target.bin",
-                                                     "signals.json",   "reference.glb", "replay.glb",  "failed.glb",
-                                                     "report.json",    "report.html",   "accuracy.csv", "accuracy.svg",
-                                                     "rig.bin"};
+constexpr std::array<std::string_view, 17> kOwnFiles{
+    "creature.toml",  "scene.toml", "body.json",  "target.bin",  "path.bin",     "rig.bin",     "appearance.bin", "morphs.bin", "wobble.bin",
+    "signals.json", "reference.glb", "replay.glb", "failed.glb", "report.json", "report.html", "accuracy.csv", "accuracy.svg"};
 
 Error directory_error(const fs::path& shown_as, int error_number) {
   return {shown_as.string(), "", std::string("the directory cannot be written: ") + std::strerror(error_number),

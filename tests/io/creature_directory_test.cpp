@@ -57,7 +57,9 @@ TEST(CreatureWriter, KeepsTheCacheAndTheUsersFilesAndNoOldResults) {
   make_creature(creature, "old");
   write_file(creature / "cache" / "body-1.bin", "cached");
   write_file(creature / "notes" / "mine.txt", "my notes");
-  write_file(creature / "replay.glb", "old motion");
+  const char* const old_results[] = {"replay.glb", "scene.toml", "appearance.bin", "morphs.bin", "path.bin", "wobble.bin", "rig.bin",
+                                     "accuracy.csv"};
+  for (const char* name : old_results) write_file(creature / name, "old");
   {
     CreatureWriter writer(creature, Start::afresh);
     EXPECT_EQ(read_file(writer.cache_directory() / "body-1.bin"), "cached");
@@ -69,7 +71,7 @@ TEST(CreatureWriter, KeepsTheCacheAndTheUsersFilesAndNoOldResults) {
   EXPECT_EQ(read_file(creature / "creature.toml"), "new");
   EXPECT_EQ(read_file(creature / "cache" / "body-1.bin"), "cached anew");
   EXPECT_EQ(read_file(creature / "notes" / "mine.txt"), "my notes");
-  EXPECT_FALSE(fs::exists(creature / "replay.glb"));
+  for (const char* name : old_results) EXPECT_FALSE(fs::exists(creature / name)) << name;
   EXPECT_FALSE(fs::exists(creature / "report.json"));
   EXPECT_EQ(directory.count(), 1U);
 }

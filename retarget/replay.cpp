@@ -6,7 +6,7 @@
 
 #include "retarget/cpu_seconds.h"
 #include "retarget/fall.h"
-#include "retarget/nominal_path.h"
+#include "retarget/path_gain.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
@@ -112,7 +112,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       curve_(target_),
       path_(path_of(input)),
       stepper_(physics::make_stepper(options.method, input.scene)),
-      corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
+      corrector_(input.model, input.muscles, input.length, input.limit, gain_on_path(input, options.corrector)),
       observer_(options.observation, control_s_),
       estimate_(options.observation, control_s_, input.scene.gravity.norm()),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),

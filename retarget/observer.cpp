@@ -25,12 +25,11 @@ const physics::State& Observer::see(const physics::State& state) {
   if (static_cast<long>(past_.size()) > delay_steps_ + 1) past_.pop_front();
   seen_ = past_.front();
   if (observation_.noise_m == 0) return seen_;
-  const bool is_first = to_.size() == 0;
-  draw(from_, state.x.cols());
-  seen_.x += from_;
-  if (is_first) to_ = seen_.x;
-  seen_.v = (seen_.x - to_) / control_s_;
-  to_ = seen_.x;
+  draw(noise_, state.x.cols());
+  seen_.x += noise_;
+  if (before_.size() == 0) before_ = seen_.x;
+  seen_.v = (seen_.x - before_) / control_s_;
+  before_ = seen_.x;
   return seen_;
 }
 

@@ -16,8 +16,8 @@ struct Observation {
   bool is_exact() const { return noise_m == 0 && delay_s == 0; }
 };
 
-/// The body as it is measured: late, and with a noise of each node's own that is drawn anew about ten times a second and
-/// passes smoothly in between, with the velocity that belongs to it, as an estimate from cameras or strain gauges strays.
+/// The body as it is measured: late, and with a noise of each node's own that is drawn anew in every control step. Velocities are
+/// then the differences of the places seen.
 class Observer {
  public:
   Observer(const Observation& observation, double control_s);
@@ -32,10 +32,10 @@ class Observer {
   void draw(Eigen::Matrix3Xd& noise, Eigen::Index nodes);
 
   Observation observation_;
-  double control_s_, share_ = 1;  // of the way from one draw to the next
+  double control_s_;
   long delay_steps_;
   std::mt19937_64 generator_;
-  Eigen::Matrix3Xd from_, to_;
+  Eigen::Matrix3Xd noise_, before_;  // before_: the places seen last
   std::deque<physics::State> past_;
   physics::State seen_;
 };

@@ -7,8 +7,8 @@
 #include "physics/effect.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/fall.h"
-#include "retarget/nominal_path.h"
 #include "retarget/obstacle_moves.h"
+#include "retarget/path_gain.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
@@ -126,7 +126,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       path_(path_of(input)),
       stepper_(physics::make_stepper(options.method, plant_)),
       effects_(physics::plan_effects(plant_)),
-      corrector_(input.model, input.muscles, input.length, input.limit, options.corrector),
+      corrector_(input.model, input.muscles, input.length, input.limit, gain_on_path(input, options.corrector)),
       observer_(options.observation, control_s_),
       estimate_(options.observation, control_s_, input.scene.gravity.norm()),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),

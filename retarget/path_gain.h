@@ -1,0 +1,12 @@
+#pragma once
+
+#include "retarget/nominal_path.h"
+#include "retarget/replay.h"
+
+namespace hydrostat::retarget {
+
+/// Feedback is calm while the error is small. A path that was learned lies beside the target, and the loop was stable there at the
+/// gain that the distance to the target gave it: now that this distance is no error any more, that gain is kept.
+CorrectorOptions gain_on_path(const ReplayInput& input, const CorrectorOptions& options);
+
+}  // namespace hydrostat::retarget

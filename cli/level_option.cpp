@@ -26,7 +26,7 @@ void add_level_options(CLI::App& app, AskedLevel& asked) {
   CLI::Option* lod = app.add_option(
       "--lod", asked.lod,
       "Replay on another control mesh of about so many nodes, 20 to 5000, with the signals carried over; auto: the "
-      "finest of a quarter, half, one, two and four times the creature's that --budget allows and that keeps its way");
+      "finest of an eighth, a quarter, half, one, two and four times the creature's that --budget allows and that keeps its way");
   app.add_option("--budget", asked.budget,
                  "2ms: processor time of solver and corrector that a frame of 1/60 s may take, by counted work")
       ->needs(lod);

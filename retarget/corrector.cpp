@@ -106,12 +106,6 @@ void Corrector::weigh_feet(const physics::State& state, const physics::State& re
   }
 }
 
-/// A creature that fights a push needs its response fresh.
-int Corrector::calls_for_response() const {
-  if (momentum_error_ < options_.calm_error) return options_.response_every;
-  return momentum_error_ < options_.hurried_error ? options_.hurried_every : 1;
-}
-
 double Corrector::least_margin() const {
   if (cones_.rows() == 0) return 0;
   return (cones_.leftCols(previous_.size()) * previous_ + cones_.col(previous_.size())).minCoeff();
@@ -122,7 +116,8 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   const physics::Body& body = scene_.body;
   const Eigen::Index muscles = muscles_.fields.cols();
   forces_.set_activation(activation);
-  if (!responses_.update(state, forces_, contact.touching, calls_for_response())) {
+  const bool is_calm = momentum_error_ < options_.calm_error;  // a creature that fights a push needs its response fresh
+  if (!responses_.update(state, forces_, contact.touching, is_calm ? options_.response_every : 1)) {
     previous_.setZero();  // nothing is added
     return 0;
   }

@@ -22,9 +22,7 @@ struct CorrectorOptions {
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
   double clearance = 0.02;      // of L: over what a foot in the air is to step onto or across
   double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
-  int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error,
-  int hurried_every = 2;        // while it is below hurried_error; above that it is made at each call
-  double hurried_error = 0.04;
+  int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
 };
 
 /// What contact does when muscles are corrected, and what it is to do.
@@ -65,7 +63,6 @@ class Corrector {
   double least_margin() const;
 
  private:
-  int calls_for_response() const;
   void find_free_deviation(const physics::State& state, const physics::State& reference);
   double weigh_momentum(const physics::State& state, double grip);
   void weigh_feet(const physics::State& state, const physics::State& reference, const ContactNow& contact);

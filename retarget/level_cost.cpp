@@ -28,7 +28,7 @@ std::vector<LevelCost> level_costs(const Performer& solved, const Rig& rig, cons
                                    const ReplayOptions& replay) {
   constexpr int kFewest = 20;
   std::vector<LevelCost> costs;
-  for (const double factor : {4.0, 2.0, 1.0, 0.5, 0.25}) {
+  for (const double factor : {4.0, 2.0, 1.0, 0.5, 0.25, 0.125}) {
     const Eigen::Index muscles = solved.muscles.fields.cols();
     LevelCost cost{0, solved.mesh.node_count(), 0};
     if (factor == 1) {

@@ -17,7 +17,7 @@ struct LevelCost {
 /// rest: the same on every machine.
 double frame_work_ms(const physics::Scene& scene, Eigen::Index muscles, const ReplayOptions& options);
 
-/// Of levels of four, two, one, a half and a quarter of the creature's number of nodes, the finest first.
+/// Of levels of four, two, one, a half, a quarter and an eighth of the number of nodes of the creature, the finest first.
 std::vector<LevelCost> level_costs(const Performer& solved, const Rig& rig, const CreatureOptions& options,
                                    const ReplayOptions& replay);
 

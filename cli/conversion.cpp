@@ -264,7 +264,7 @@ void Conversion::choose_steps() {
 }
 
 void Conversion::cut_signals() {
-  if (chosen_->harmonics > 0) signals_ = retarget::with_harmonics(whole_signals_, chosen_->harmonics);
+  signals_ = chosen_->harmonics > 0 ? retarget::with_harmonics(whole_signals_, chosen_->harmonics) : whole_signals_;
   tell_signals();
 }
 
@@ -281,17 +281,33 @@ void Conversion::choose_nodes(const io::ImportedCharacter& imported, double wish
     if (!coarser || coarser->creature_.mesh.node_count() == last) continue;
     last = coarser->creature_.mesh.node_count();
     if (last >= own) return;
-    ChosenStep chosen = *chosen_;
-    const bool is_taken = take_coarser(chosen, target_.performer, coarser->target_.performer, coarser->signals_);
-    if (is_taken) coarser->perform();
-    if (is_taken && !is_down(coarser->performances_.main()) && !strays(*chosen_, coarser->performances_.main())) {
-      chosen.wished_nodes = wished;
-      chosen_ = std::move(chosen);
-      take_over(*coarser);
-      return;
-    }
-    chosen_->curve.rows.push_back(chosen.curve.rows.back());
+    if (take_mesh(*coarser, wished, chosen_->setting, chosen_->harmonics)) return;
+    // The error that a cheap method and few harmonics use up may be what this mesh needs.
+    const retarget::StepSetting accurate{physics::Method::kExplicit, kControlSeconds};
+    const bool is_other = chosen_->setting.method != accurate.method || chosen_->harmonics > 0;
+    if (options_.method == "auto" && is_other && take_mesh(*coarser, wished, accurate, 0)) return;
   }
+}
+
+bool Conversion::take_mesh(Conversion& coarser, int wished, const retarget::StepSetting& setting, int harmonics) {
+  ChosenStep chosen = *chosen_;
+  chosen.setting = setting;
+  chosen.harmonics = harmonics;
+  chosen.wished_nodes = wished;
+  coarser.chosen_ = chosen;
+  coarser.cut_signals();
+  const bool is_cheaper = take_coarser(chosen, target_.performer, coarser.target_.performer, coarser.signals_);
+  chosen_->curve.rows.push_back(chosen.curve.rows.back());
+  if (!is_cheaper) return false;
+  const std::string solved_key = coarser.key_;
+  coarser.perform();
+  if (is_down(coarser.performances_.main()) || strays(*chosen_, coarser.performances_.main())) {
+    coarser.key_ = solved_key;
+    return false;
+  }
+  chosen_ = std::move(chosen);
+  take_over(coarser);
+  return true;
 }
 
 std::unique_ptr<Conversion> Conversion::on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished,

@@ -56,7 +56,11 @@ class Conversion {
   /// Solved, and on its feet to the end, on the coarsest mesh that keeps the error: it takes the place of what is here.
   void choose_nodes(const io::ImportedCharacter& imported, double wished_limit);
 
-  /// The same on a mesh of so many wished nodes; none where the clip cannot be solved on it.
+  /// Whether it is on its feet to the end and within the error there, by a setting that does less work than what is chosen; 0
+  /// harmonics: all.
+  bool take_mesh(Conversion& coarser, int wished, const retarget::StepSetting& setting, int harmonics);
+
+  /// Solved on a mesh of so many wished nodes; none where the clip cannot be solved on it.
   std::unique_ptr<Conversion> on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished, Stages& stages);
 
   Stages coarser_stages(Progress& progress) const;

@@ -148,6 +148,7 @@ void Conversion::solve(const io::ImportedCharacter& imported, double wished_limi
   make_body(imported);
   find_activations(wished_limit);
   solve_signals();
+  solved_key_ = key_;
 }
 
 void Conversion::add_warnings(const std::vector<std::string>& more) {
@@ -234,7 +235,12 @@ void Conversion::choose(const io::ImportedCharacter& imported, double wished_lim
   }
   stages_.run("accuracy", [&] {
     choose_steps();
-    if (settings_.nodes == 0 && chosen_->report.is_met()) choose_nodes(imported, wished_limit);
+    return 0;
+  });
+  perform_within_error();
+  if (settings_.nodes > 0 || !chosen_->report.is_met() || is_down(performances_.main())) return;
+  stages_.run("resolution", [&] {
+    choose_nodes(imported, wished_limit);
     return 0;
   });
 }
@@ -299,12 +305,9 @@ bool Conversion::take_mesh(Conversion& coarser, int wished, const retarget::Step
   const bool is_cheaper = take_coarser(chosen, target_.performer, coarser.target_.performer, coarser.signals_);
   chosen_->curve.rows.push_back(chosen.curve.rows.back());
   if (!is_cheaper) return false;
-  const std::string solved_key = coarser.key_;
+  coarser.key_ = coarser.solved_key_;
   coarser.perform();
-  if (is_down(coarser.performances_.main()) || strays(*chosen_, coarser.performances_.main())) {
-    coarser.key_ = solved_key;
-    return false;
-  }
+  if (is_down(coarser.performances_.main()) || strays(*chosen_, coarser.performances_.main())) return false;
   chosen_ = std::move(chosen);
   take_over(coarser);
   return true;
@@ -330,6 +333,7 @@ std::unique_ptr<Conversion> Conversion::on_coarser_mesh(const io::ImportedCharac
 void Conversion::take_over(Conversion& coarser) {
   settings_ = coarser.settings_;
   key_ = coarser.key_;
+  solved_key_ = coarser.solved_key_;
   creature_ = std::move(coarser.creature_);
   motion_ = std::move(coarser.motion_);
   inverse_ = std::move(coarser.inverse_);
@@ -353,21 +357,29 @@ void Conversion::put_in_scene() {
   if (options_.scene.empty()) return;
   in_scene_ = target_.performer;
   add_warnings(io::put_in_scene(options_.scene, *in_scene_));
-  key_ = key_after(key_, scene_text_);
+  solved_key_ = key_after(solved_key_, scene_text_);
   is_performed_ = false;
 }
 
-void Conversion::let_go() {
-  if (!is_performed_) perform();
+void Conversion::perform_within_error() {
+  key_ = solved_key_;
+  perform();
   const auto is_short_of_it = [&] {  // of the error as it was measured: outside a scene
     return is_down(performances_.main()) || (!in_scene_ && strays(*chosen_, performances_.main()));
   };
-  while (chosen_ && is_short_of_it() && take_next(*chosen_, target_.performer, whole_signals_)) {
+  const bool is_own_mesh = chosen_ && chosen_->wished_nodes == 0;  // others have been performed before they were taken
+  while (is_own_mesh && is_short_of_it() && take_next(*chosen_, target_.performer, whole_signals_)) {
     add_warnings({chosen_->warnings.back()});
     signals_ = whole_signals_;
     tell_signals();
+    key_ = solved_key_;
     perform();
   }
+  is_performed_ = true;
+}
+
+void Conversion::let_go() {
+  if (!is_performed_) perform_within_error();
   if (!choice_key_.empty()) stages_.cache().store("accuracy", choice_key_, record_of_choice(*chosen_));
   if (wants_polish(options_) && !is_down(performances_.main())) polish();
   add_warnings(retarget::feedback_warnings(performances_));

@@ -77,6 +77,9 @@ class Conversion {
 
   void tell_signals();
 
+  /// By what was chosen, or the next that neither falls nor strays.
+  void perform_within_error();
+
   void let_go();
 
   retarget::PerformOptions perform_options() const;
@@ -95,7 +98,8 @@ class Conversion {
   retarget::CreatureOptions settings_;
   Stages& stages_;
   io::CreatureWriter& writer_;
-  std::string key_;  // of the last stage
+  std::string key_;         // of the last stage
+  std::string solved_key_;  // of what is performed, by any setting
   retarget::Creature creature_;
   retarget::ImportedMotion motion_;
   retarget::InverseDynamics inverse_;

@@ -246,7 +246,8 @@ std::string too_inaccurate(const std::string& where, const retarget::AccuracyRep
 void add_accuracy_options(CLI::App& app, AskedAccuracy& asked) {
   CLI::Option* most = app.add_option(
       "--max-error", asked.max_error,
-      "1% or 0.01 of L: the cheapest method and step are taken that stay within it, as measured on this body");
+      "1% or 0.01 of L: the cheapest method and step are taken that stay within it, as measured on this body; by convert the cheapest "
+      "number of harmonics and, without --nodes, control mesh too");
   app.add_option("--accuracy", asked.grade, "draft, standard or final: --max-error 5%, 1% or 0.1%")
       ->check(CLI::IsMember({"draft", "standard", "final"}))
       ->excludes(most);

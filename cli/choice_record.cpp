@@ -37,13 +37,7 @@ namespace hydrostat::cli {
 io::Record record_of_choice(const ChosenStep& chosen) {
   io::Record record;
   io::RecordArchive archive = io::RecordArchive::saving_to(record);
-  ChosenStep copy;  // the fields are named as those that loading writes to
-  copy.setting = chosen.setting;
-  copy.report = chosen.report;
-  copy.curve = chosen.curve;
-  copy.harmonics = chosen.harmonics;
-  copy.wished_nodes = chosen.wished_nodes;
-  copy.warnings = chosen.warnings;
+  ChosenStep copy = chosen;  // the fields are named as those that loading writes to
   name_fields(archive, copy);
   return record;
 }

@@ -94,6 +94,20 @@ int frames_from_edge(const ContactSchedule& contacts, int point, long f, bool lo
   return 3;
 }
 
+/// The stencil's sum over the path of the COM (3 x F) of a motion around frame f; odd reflection at the ends of what is no loop.
+Eigen::Vector3d jerk_of(const Eigen::MatrixXd& com, const Motion& motion, long f, const std::vector<double>& stencil) {
+  const long frames = motion.count(), reach = static_cast<long>(stencil.size()) / 2;
+  const auto place = [&](long g) -> Eigen::Vector3d {
+    const long cycle = g < 0 ? -1 : (g >= frames ? 1 : 0);
+    if (motion.loop) return after_cycles(motion, cycle) * Eigen::Vector3d(com.col(g - cycle * frames));
+    const long inside = std::clamp(g, 0L, frames - 1);
+    return inside == g ? Eigen::Vector3d(com.col(g)) : Eigen::Vector3d(2 * com.col(inside) - com.col(std::clamp(2 * inside - g, 0L, frames - 1)));
+  };
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (long k = 0; k < static_cast<long>(stencil.size()); ++k) sum += stencil[static_cast<std::size_t>(k)] * place(f + k - reach);
+  return sum;
+}
+
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// What one frame wants of contact, and what contact can give.
@@ -188,7 +202,7 @@ class Rows {
 /// Unknowns: 6 per frame (move, turn), then the forces in weights, frame after frame, not negative.
 BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts,
                                   const Centroidal& now, const std::vector<FrameBalance>& balances, double length,
-                                  double force_share) {
+                                  const ShiftCosts& costs) {
   const long frames = target.count();
   const double rate_squared = target.rate_hz * target.rate_hz, g = scene.gravity.norm(), w = kBalanceWeight;
   const double weight = scene.body.mass.sum() * g, bend = kBendWeight * std::pow(target.rate_hz / 60, 3);
@@ -210,7 +224,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     rows.end_block(-w * frame.want);
     for (long k = 0; k < forces; ++k) {
       const int age = frames_from_edge(contacts, frame.generators[static_cast<std::size_t>(k)].point, f, target.loop);
-      rows.add(rows.next(), column + k, force_share * (age < 3 ? kEdgeForceWeight[age] : kForceWeight));
+      rows.add(rows.next(), column + k, costs.forces * (age < 3 ? kEdgeForceWeight[age] : kForceWeight));
       rows.end_block(Eigen::VectorXd::Zero(1));
       problem.column_blocks.push_back(static_cast<int>(column + k + 1));
     }
@@ -220,7 +234,10 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     rows.add_block(still + 3, f, 3, kShiftWeight * identity);
     rows.add_stencil(still + 6, f, 0, bend / length * identity, third);
     rows.add_stencil(still + 9, f, 3, bend * identity, third);
-    rows.end_block(Eigen::VectorXd::Zero(12));
+    if (costs.jerk > 0) rows.add_stencil(still + 12, f, 0, costs.jerk * bend / length * identity, third);
+    Eigen::VectorXd wanted = Eigen::VectorXd::Zero(costs.jerk > 0 ? 15 : 12);
+    if (costs.jerk > 0) wanted.tail<3>() = -costs.jerk * bend / length * jerk_of(now.com, target, f, third);
+    rows.end_block(wanted);
   }
   rows.finish(column);
   problem.lower = Eigen::VectorXd::Constant(column, -std::numeric_limits<double>::infinity());
@@ -258,10 +275,10 @@ std::vector<ContactGenerator> contact_generators(const ContactSchedule& contacts
 }
 
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots, double force_share) {
+                 double support_friction, int max_pivots, const ShiftCosts& costs) {
   const Centroidal now = centroidal(target, scene.body);
   const std::vector<FrameBalance> balances = frame_balances(target, now, scene, contacts, length, support_friction);
-  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, force_share);
+  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, costs);
   const long frames = target.count(), forces = problem.lower.size() - 6 * frames;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(problem.lower.size());
   start.tail(forces).setConstant(1e-3);

@@ -25,11 +25,17 @@ struct Shift {
   bool converged = false;
 };
 
+/// What a shift costs beside its own size.
+struct ShiftCosts {
+  double forces = 1;  // share of the usual cost of contact forces, which lets loads come and go gently
+  double jerk = 0;    // of the COM's own path, per cost of the shift's jerk: a landing is spread over the frames that can bear it
+};
+
 /// The least shift of the COM and turn of the trunk with which gravity, contact forces inside the friction pyramid and momentum, linear
 /// and angular, balance in every frame. length [m] is L. Source: Kajita's and Wensing's centroidal balance in the form of the design,
-/// section 5; weights measured on our clips. Forces cost `force_share` of their usual weight, which lets loads come and go gently.
+/// section 5; weights measured on our clips.
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots = 60, double force_share = 1);
+                 double support_friction, int max_pivots = 60, const ShiftCosts& costs = {});
 
 /// The motion with every frame moved and turned about its COM.
 Motion shifted(const Motion& motion, const Shift& shift, const physics::Body& body);

@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include "retarget/balance.h"
+#include "retarget/leaps.h"
 #include "retarget/let_go.h"
 #include "retarget/needed_strain.h"
 #include "retarget/shape_projection.h"
@@ -21,7 +23,8 @@ constexpr double kOverReach = 1.5;    // times reach: what a clip needs beyond t
 constexpr double kFar = 0.04;         // of L: further no shift should move a clip
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
-constexpr double kLeapForces = 0.1;   // share of the forces' cost for a leap that would be moved further
+constexpr ShiftCosts kLeapCosts{0.1, 2};  // of a leap that would be moved further: it launches by force and lands softly
+constexpr double kReachOut = 1.0 / 60;    // [s] that its feet come down earlier
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
 
 double rms_difference(const Motion& a, const Motion& b, const Eigen::VectorXd& mass) {
@@ -51,13 +54,12 @@ ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, co
   return schedules[chosen];
 }
 
-/// A leap launches and lands by force: where loads that come and go gently would move it too far, they cost less.
-double force_share(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                   double support_friction) {
-  if (contacts.flight_s(target.rate_hz) < kLeap) return 1;
+/// Whether a clip leaps and loads that come and go gently would move it too far.
+bool leaps_far(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length, double support_friction) {
+  if (contacts.flight_s(target.rate_hz) < kLeap) return false;
   const Shift shift = find_shift(target, scene, contacts, length, support_friction);
   const double far = std::sqrt(shift.move.squaredNorm() / static_cast<double>(shift.move.cols()));
-  return far > kFar * length ? kLeapForces : 1;
+  return far > kFar * length;
 }
 
 /// The foot lock: the mean offset of each patch to its holds moves its bone's nodes and fades out over the frames around the contact.
@@ -126,6 +128,13 @@ double reach_of(const Motion& motion, const physics::Body& body, double reach, s
   return reach;
 }
 
+/// Where feet are off the ground because the target has lifted them they bear nothing, nor, in a far leap, where they fly off.
+void mark_loads(const Motion& target, const physics::Scene& scene, double length, double size, bool is_far_leap, ContactSchedule& contacts) {
+  const Motion points = point_motion(scene.contact_points, target);
+  mark_touching(points, kTouching * size, contacts);
+  if (is_far_leap) let_go(points, kFliesOff * std::sqrt(scene.gravity.norm() * length), contacts);
+}
+
 void lower_by(double ground, Motion& motion) {
   for (Eigen::Index r = 1; r < motion.frames.rows(); r += 3) motion.frames.row(r).array() -= ground;
 }
@@ -149,31 +158,36 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   lower_by(ground, points);
   const Motion grounded = target;
   contacts = choose_contacts(target, points, scene, patch_bone, bone_names, length, size, options);
-  const std::vector<std::vector<Hold>> holds = find_holds(contacts, points);
-  const Eigen::MatrixXd floor = floors(contacts, target.loop, options.clearance * size, options.clearance_frames);
-  const Motion locked = lock_feet(grounded, scene, contacts, holds, floor, bone_names, node_bone_weights, options.smooth_hz);
-  report.foot_shift_rms_length = rms_difference(locked, grounded, body.mass) / length;
-
-  ShapeProjector projector(scene, length, options.volume, reach_of(locked, body, options.reach, result.warnings));
-  target = project_frames(locked, holds, floor, projector, options.smooth_hz);
-  report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
-  double share = 1;  // of the forces' usual cost; where it is less, loads do not fade by themselves before a foot leaves
-  const auto remark = [&] {
-    const Motion touching = point_motion(scene.contact_points, target);
-    mark_touching(touching, kTouching * size, contacts);
-    if (share < 1) let_go(touching, kFliesOff * std::sqrt(scene.gravity.norm() * length), contacts);
+  std::vector<std::vector<Hold>> holds = find_holds(contacts, points);
+  Eigen::MatrixXd floor;
+  Motion locked;
+  std::optional<ShapeProjector> projector;
+  const auto set_feet = [&] {
+    floor = floors(contacts, grounded.loop, options.clearance * size, options.clearance_frames);
+    locked = lock_feet(grounded, scene, contacts, holds, floor, bone_names, node_bone_weights, options.smooth_hz);
+    if (!projector) projector.emplace(scene, length, options.volume, reach_of(locked, body, options.reach, result.warnings));
+    target = project_frames(locked, holds, floor, *projector, options.smooth_hz);
   };
-  remark();
+  bool is_far_leap = false;  // then loads do not fade by themselves before a foot leaves
+  const auto mark = [&] { mark_loads(target, scene, length, size, is_far_leap, contacts); };
+  set_feet();
+  mark();
+  if (options.momentum) is_far_leap = leaps_far(target, scene, contacts, length, options.support_friction);
+  if (is_far_leap) {
+    reach_out(points, std::max(1L, std::lround(kReachOut * points.rate_hz)), contacts, holds);
+    set_feet();
+    mark();
+  }
+  report.foot_shift_rms_length = rms_difference(locked, grounded, body.mass) / length;
+  report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
   const Motion before_momentum = target;
   Motion wanted = locked;  // the animator's shape with the shifts so far
-  if (options.momentum) share = force_share(target, scene, contacts, length, options.support_friction);
-  remark();
   for (int round = 0; options.momentum && round < options.rounds; ++round) {
-    const Shift shift = find_shift(target, scene, contacts, length, options.support_friction, 60, share);
+    const Shift shift = find_shift(target, scene, contacts, length, options.support_friction, 60, is_far_leap ? kLeapCosts : ShiftCosts());
     wanted = shifted(wanted, shift, body);
-    target = project_frames(wanted, holds, floor, projector, options.smooth_hz);
+    target = project_frames(wanted, holds, floor, *projector, options.smooth_hz);
     fall_freely(contacts, scene, target);
-    remark();
+    mark();
   }
   report.momentum_shift_rms_length = rms_difference(target, before_momentum, body.mass) / length;
   report.total_shift_rms_length = rms_difference(target, grounded, body.mass) / length;

@@ -7,6 +7,7 @@
 #include "physics/effect.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/fall.h"
+#include "retarget/leaps.h"
 #include "retarget/obstacle_moves.h"
 #include "retarget/path_gain.h"
 #include "retarget/reference_glide.h"
@@ -88,6 +89,7 @@ class Run {
   Observer observer_;
   StateEstimate estimate_;
   ReferenceGlide glide_;
+  const std::vector<std::vector<bool>> steps_next_;
   std::optional<UnevenGround> uneven_;  // where there is more than the plan's ground
   StrideFeedback stride_;
   ReturnMap return_map_;
@@ -126,10 +128,11 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       path_(path_of(input)),
       stepper_(physics::make_stepper(options.method, plant_)),
       effects_(physics::plan_effects(plant_)),
-      corrector_(input.model, input.muscles, input.length, input.limit, gain_on_path(input, options.corrector)),
+      corrector_(input.model, input.muscles, input.length, input.limit, gain_of_leaps(input.prepared, gain_on_path(input, options.corrector))),
       observer_(options.observation, control_s_),
       estimate_(options.observation, control_s_, input.scene.gravity.norm()),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
+      steps_next_(steps_next(input.prepared.contacts, target_.rate_hz, target_.loop)),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
@@ -175,7 +178,7 @@ void Run::look_at_contacts() {
       touches = touches || contact_.touching[point] != ContactState::kOff;
     }
     const bool is_caught = uneven_ && touches && planned[now] == ContactState::kOff;  // by an edge: it is to get over it
-    if (plan.patches[k].on_leg && (!touches || is_caught)) contact_.in_air.push_back(&plan.patches[k]);
+    if (plan.patches[k].on_leg && (!touches || is_caught) && steps_next_[k][now]) contact_.in_air.push_back(&plan.patches[k]);
   }
   // In flight nothing holds the trunk against a leg that swings.
   if (contact_.in_air.size() == plan.patches.size()) contact_.in_air.clear();

@@ -82,5 +82,34 @@ TEST(FindShift, LeavesABalancedBodyWhereItIs) {
   EXPECT_LT(shift.badness, 1e-3);
 }
 
+/// A box that comes down on its four soles and stops within a frame; it lands in frame `landing` with `speed` [m/s].
+Motion dropped(const BoxCreature& creature, Eigen::Index frames, Eigen::Index landing, double speed) {
+  return played(creature, frames, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
+    const double before_s = static_cast<double>(std::max<Eigen::Index>(0, landing - f)) / 60;
+    return Eigen::Vector3d(x + Eigen::Vector3d(0, speed * before_s, 0));
+  });
+}
+
+TEST(FindShift, AJerkThatCostsSpreadsALanding) {
+  const BoxCreature creature = make_box_creature();
+  for (const double speed : {0.5, 1.0, 1.5}) {
+    SCOPED_TRACE("speed " + std::to_string(speed));
+    const Motion motion = dropped(creature, 24, 12, speed);
+    const ContactSchedule contacts = always_standing(creature, 24);
+    const auto hardest_stop = [&](double jerk) {  // [m/s2]
+      const Shift shift = find_shift(motion, creature.scene, contacts, 1, 0.7, 60, {0.1, jerk});
+      EXPECT_TRUE(shift.converged);
+      Motion com = motion;
+      com.frames = shift.move;
+      for (Eigen::Index f = 0; f < 24; ++f) com.frames.col(f) += physics::centre_of_mass(creature.scene.body, motion.at(f));
+      return accelerations(com).row(1).maxCoeff();
+    };
+    const double as_drawn = 60 * speed, hard = hardest_stop(0), soft = hardest_stop(2);
+    EXPECT_LT(hard, 1.01 * as_drawn);
+    EXPECT_LT(soft, 0.7 * hard);
+    EXPECT_LT(hardest_stop(8), soft);
+  }
+}
+
 }  // namespace
 }  // namespace hydrostat::retarget

@@ -1,0 +1,96 @@
+#include "retarget/leaps.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kLeap = 0.05;     // [s] in the air: less is a flicker of contacts
+constexpr double kLanding = 0.07;  // [s] from the flight to the last foot that lands
+constexpr double kFeetOfLeaps = 1.0 / 8, kMomentumOfHops = 0.5;  // of the rows' usual weights
+
+/// Frame f of a loop may lie a period on or before.
+std::size_t wrapped(long f, long frames) { return static_cast<std::size_t>(((f % frames) + frames) % frames); }
+
+/// Whether patch k begins to stick in frame f and comes out of a flight.
+bool lands(const ContactSchedule& contacts, const std::vector<bool>& flying, std::size_t k, long f, long landing, bool loop) {
+  const long frames = static_cast<long>(flying.size());
+  const std::vector<ContactState>& states = contacts.state[k];
+  if (!loop && f == 0) return false;
+  if (states[wrapped(f, frames)] != ContactState::kStick || states[wrapped(f - 1, frames)] != ContactState::kOff) return false;
+  for (long d = 1; d <= landing && (loop || d <= f); ++d) {
+    if (flying[wrapped(f - d, frames)]) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_hz, bool loop) {
+  const long frames = contacts.touching.cols();
+  const auto touches = [&](long f) {
+    const auto bears = [&](const std::vector<ContactState>& states) { return states[wrapped(f, frames)] != ContactState::kOff; };
+    return std::any_of(contacts.state.begin(), contacts.state.end(), bears);
+  };
+  std::vector<bool> flying(static_cast<std::size_t>(frames), false);
+  for (long f = 0; f < frames; ++f) {
+    const bool begins = !touches(f) && (f == 0 ? !loop || touches(-1) : touches(f - 1));
+    if (!begins) continue;
+    long end = f;
+    while (!touches(end) && (loop || end < frames)) ++end;
+    if (static_cast<double>(end - f) / rate_hz < kLeap) continue;
+    for (long g = f; g < end; ++g) flying[wrapped(g, frames)] = true;
+  }
+  return flying;
+}
+
+void reach_out(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds) {
+  const ContactSchedule before = contacts;
+  const std::vector<std::vector<Hold>> held = holds;
+  const std::vector<bool> flying = frames_in_flight(contacts, points.rate_hz, points.loop);
+  const long count = points.count(), landing = std::lround(kLanding * points.rate_hz);
+  for (std::size_t k = 0; k < before.patches.size(); ++k) {
+    const std::vector<int>& own = before.patches[k].points;
+    for (long f = 0; f < count; ++f) {
+      if (!lands(before, flying, k, f, landing, points.loop)) continue;
+      for (long d = 1; d <= frames && (points.loop || d <= f); ++d) {
+        const std::size_t g = wrapped(f - d, count);
+        if (contacts.state[k][g] != ContactState::kOff) break;
+        contacts.state[k][g] = ContactState::kStick;
+        for (const int p : own) contacts.touching(p, static_cast<Eigen::Index>(g)) = before.touching(p, f);
+        for (Hold hold : held[static_cast<std::size_t>(f)]) {
+          if (std::find(own.begin(), own.end(), hold.point) == own.end()) continue;
+          if (d > f) hold.place = after_cycles(points, 1) * hold.place;
+          holds[g].push_back(hold);
+        }
+      }
+    }
+  }
+}
+
+std::vector<std::vector<bool>> steps_next(const ContactSchedule& contacts, double rate_hz, bool loop) {
+  const std::vector<bool> flying = frames_in_flight(contacts, rate_hz, loop);
+  const long frames = static_cast<long>(flying.size());
+  std::vector<std::vector<bool>> steps(contacts.state.size(), std::vector<bool>(flying.size(), true));
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    for (long f = 0; f < frames; ++f) {
+      const long last = loop ? f + frames : frames;
+      for (long g = f; g < last && contacts.state[k][wrapped(g, frames)] == ContactState::kOff; ++g) {
+        if (flying[wrapped(g, frames)]) steps[k][static_cast<std::size_t>(f)] = false;
+      }
+    }
+  }
+  return steps;
+}
+
+CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOptions& options) {
+  CorrectorOptions result = options;
+  const std::vector<bool> flying = frames_in_flight(plan.contacts, plan.target.rate_hz, plan.target.loop);
+  if (std::find(flying.begin(), flying.end(), true) == flying.end()) return result;
+  result.foot_weight *= kFeetOfLeaps;
+  if (plan.target.loop) result.root_weight *= kMomentumOfHops;
+  return result;
+}
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "retarget/corrector.h"
+#include "retarget/prepare.h"
+#include "retarget/shape_projection.h"
+
+namespace hydrostat::retarget {
+
+/// Whether a frame lies in a flight: for 0.05 s or longer nothing touches; less is a flicker of contacts. F.
+std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_hz, bool loop);
+
+/// Lets every stance that comes out of a flight begin `frames` earlier, on the place on which it will stand: feet that reach out bring
+/// a body to rest over a longer way than feet that come down with it. Patches that stick within 0.07 s after the flight are taken for
+/// those that land. `points` is the motion of the contact points, `holds` are find_holds' of `contacts`; both grow by those frames.
+void reach_out(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds);
+
+/// Whether a patch that is off the ground in a frame, or in the midst of a stance, touches next without a flight before: patches x F. What
+/// is to fly first is no foot that could step under the body. All true where nothing flies.
+std::vector<std::vector<bool>> steps_next(const ContactSchedule& contacts, double rate_hz, bool loop);
+
+/// Feedback for a plan that flies; any other's is as it was. A foot that a landing shakes loose is wanted back on its place rather than
+/// under the body, so that the rows of feet in the air weigh an eighth. A loop has the next hop to make up for an error of momentum,
+/// and the moment of its push is too short to do so at once: these rows weigh half. What is played once has to stand where it lands.
+CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOptions& options);
+
+}  // namespace hydrostat::retarget

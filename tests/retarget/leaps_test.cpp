@@ -1,0 +1,139 @@
+#include "retarget/leaps.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+
+namespace hydrostat::retarget {
+namespace {
+
+using enum ContactState;
+constexpr long kFrames = 30;
+
+struct Leap {
+  Motion points;
+  ContactSchedule contacts;
+  std::vector<std::vector<Hold>> holds;
+};
+
+/// Two feet of one point each, at 60 Hz. Foot k stands for `stances[k]` frames from `begin[k]` on, round the seam of a loop, which travels
+/// by 1 m; the point's height tells its frame.
+Leap leap(const long (&begin)[2], const long (&stances)[2], bool loop = true) {
+  Leap result;
+  Motion& points = result.points;
+  points.rate_hz = 60;
+  points.loop = loop;
+  points.travel = Eigen::Vector3d(0, 0, 1);
+  points.frames = Eigen::MatrixXd::Zero(6, kFrames);
+  result.contacts.patches = {{"fore", {0}, true}, {"hind", {1}, true}};
+  result.contacts.state.assign(2, std::vector<ContactState>(kFrames, kOff));
+  result.contacts.touching = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(2, kFrames, false);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    for (long f = begin[k]; f < begin[k] + stances[k]; ++f) {
+      result.contacts.state[k][static_cast<std::size_t>(f % kFrames)] = kStick;
+      result.contacts.touching(row, f % kFrames) = true;
+    }
+    for (long f = 0; f < kFrames; ++f) points.frames(3 * row, f) = static_cast<double>(k);
+  }
+  result.holds = find_holds(result.contacts, points);
+  return result;
+}
+
+TEST(FramesInFlight, AreThoseInWhichNothingTouchesForLong) {
+  for (const long gap : {1L, 2L, 3L, 8L}) {  // 0.05 s are 3 frames
+    SCOPED_TRACE("gap " + std::to_string(gap));
+    const std::vector<bool> flying = frames_in_flight(leap({0, 0}, {kFrames - gap, kFrames - gap}).contacts, 60, true);
+    EXPECT_EQ(std::count(flying.begin(), flying.end(), true), gap >= 3 ? gap : 0);
+    EXPECT_EQ(flying.back(), gap >= 3);
+  }
+  const std::vector<bool> never_down = frames_in_flight(leap({0, 0}, {0, 0}, false).contacts, 60, false);
+  EXPECT_EQ(std::count(never_down.begin(), never_down.end(), true), kFrames);
+}
+
+TEST(FramesInFlight, ALoopFliesOverItsSeam) {
+  const std::vector<bool> flying = frames_in_flight(leap({2, 2}, {kFrames - 4, kFrames - 4}).contacts, 60, true);
+  EXPECT_TRUE(flying[0] && flying[1] && flying[kFrames - 1] && flying[kFrames - 2]);
+  EXPECT_EQ(std::count(flying.begin(), flying.end(), true), 4);
+}
+
+TEST(ReachOut, WhatLandsComesDownEarlierOnItsPlace) {
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const long begin = std::uniform_int_distribution<long>(0, kFrames - 1)(random), early = std::uniform_int_distribution<long>(1, 2)(random);
+    const long later = std::uniform_int_distribution<long>(0, 2)(random);  // the second foot
+    Leap after = leap({begin, begin + later}, {12, 12});
+    const Leap before = after;
+    reach_out(after.points, early, after.contacts, after.holds);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const long first = begin + (k == 1 ? later : 0);
+      for (long f = 0; f < kFrames; ++f) {
+        const auto frame = static_cast<std::size_t>(f);
+        const bool is_new = (first - f - 1 + 2 * kFrames) % kFrames < early;
+        EXPECT_EQ(after.contacts.state[k][frame], is_new ? kStick : before.contacts.state[k][frame]) << k << " " << f;
+        EXPECT_EQ(after.contacts.touching(static_cast<Eigen::Index>(k), f), after.contacts.state[k][frame] == kStick);
+        const auto held = [&](const Leap& leap) {
+          return std::find_if(leap.holds[frame].begin(), leap.holds[frame].end(), [&](const Hold& h) { return h.point == static_cast<int>(k); });
+        };
+        ASSERT_EQ(held(after) != after.holds[frame].end(), after.contacts.state[k][frame] == kStick);
+        if (!is_new) continue;
+        // Over the seam the place is that of the next period.
+        const auto there = static_cast<std::size_t>(first % kFrames);
+        const auto stands = std::find_if(before.holds[there].begin(), before.holds[there].end(), [&](const Hold& h) { return h.point == static_cast<int>(k); });
+        const double travelled = f > first % kFrames ? 1 : 0;
+        EXPECT_LT((held(after)->place - stands->place - Eigen::Vector3d(0, 0, travelled)).norm(), 1e-12);
+      }
+    }
+  }
+}
+
+TEST(ReachOut, WhoNeverFliesStandsAsBefore) {
+  for (const long gap : {0L, 1L, 2L}) {  // both in the air: a flicker
+    Leap after = leap({0, 15}, {15, 15 - gap});
+    const Leap before = after;
+    reach_out(after.points, 1, after.contacts, after.holds);
+    EXPECT_EQ(after.contacts.state, before.contacts.state);
+  }
+  Leap late = leap({0, 8}, {20, 12});  // the second foot comes long after the landing
+  reach_out(late.points, 1, late.contacts, late.holds);
+  EXPECT_EQ(late.contacts.state[0][kFrames - 1], kStick);
+  EXPECT_EQ(late.contacts.state[1][7], kOff);
+}
+
+TEST(StepsNext, AFootThatFliesFirstIsNone) {
+  // The first foot leaves in frame 10, the second in 14; both land at the loop's seam.
+  const std::vector<std::vector<bool>> steps = steps_next(leap({0, 0}, {10, 14}).contacts, 60, true);
+  for (long f = 0; f < kFrames; ++f) {
+    EXPECT_EQ(steps[0][static_cast<std::size_t>(f)], f < 10) << f;
+    EXPECT_EQ(steps[1][static_cast<std::size_t>(f)], f < 14) << f;
+  }
+  // After the landing the second foot is still to come.
+  const std::vector<std::vector<bool>> last = steps_next(leap({0, 4}, {20, 16}).contacts, 60, true);
+  for (long f = 0; f < 4; ++f) EXPECT_TRUE(last[1][static_cast<std::size_t>(f)]) << f;
+  EXPECT_FALSE(last[1][25]);
+}
+
+TEST(StepsNext, WhoNeverFliesStepsAlways) {
+  for (const std::vector<bool>& foot : steps_next(leap({0, 15}, {15, 15}).contacts, 60, true)) {
+    EXPECT_EQ(std::count(foot.begin(), foot.end(), true), kFrames);
+  }
+}
+
+TEST(GainOfLeaps, IsTheUsualOfWhatNeverFlies) {
+  CorrectorOptions usual;
+  const auto gain_of = [&](const Leap& leap) { return gain_of_leaps({leap.points, leap.contacts, {}, {}, {}, {}}, usual); };
+  const CorrectorOptions walk = gain_of(leap({0, 15}, {15, 15})), hops = gain_of(leap({0, 0}, {15, 15}));
+  EXPECT_EQ(walk.foot_weight, usual.foot_weight);
+  EXPECT_EQ(walk.root_weight, usual.root_weight);
+  EXPECT_LT(hops.foot_weight, usual.foot_weight);
+  EXPECT_LT(hops.root_weight, usual.root_weight);
+  const CorrectorOptions jump = gain_of(leap({20, 20}, {10, 10}, false));
+  EXPECT_LT(jump.foot_weight, usual.foot_weight);
+  EXPECT_EQ(jump.root_weight, usual.root_weight) << "it has to stand where it lands";
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget

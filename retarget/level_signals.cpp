@@ -62,7 +62,7 @@ double level_limit(const Performer& solved, double limit, const Performer& level
 }
 
 /// What was done to the solved signals since they were solved, in measures along the level's constraints, E x F; empty: nothing.
-Eigen::MatrixXd carried_changes(const Performer& solved, const SignalSet& signals, const Rig& rig, const ControlMesh& mesh) {
+Eigen::MatrixXd carried_changes(const Performer& solved, const SignalSet& signals, const Rig& rig, const Performer& level) {
   const physics::Body& body = solved.scene.body;
   const SignalSet own = own_plan(solved, signals.limit, signals.activation.harmonics());
   const auto measures = [&](const SignalSet& set) {
@@ -71,7 +71,7 @@ Eigen::MatrixXd carried_changes(const Performer& solved, const SignalSet& signal
   const Eigen::MatrixXd changes = measures(signals) - measures(own);
   if (changes.cwiseAbs().maxCoeff() < kNoChange) return {};
   const Eigen::MatrixXd tensors = tensors_along(body.rest, body.edges, changes);
-  return values_along(tensors, solved.mesh, rig.bone_weights, mesh, mesh.edges);
+  return values_along(tensors, solved.mesh, rig.bone_weights, level.mesh, level.scene.body.edges);
 }
 
 /// The changes made to a plan, within its limit.
@@ -92,7 +92,7 @@ void add_changes(const Performer& level, const Eigen::MatrixXd& changes, SignalS
 
 SignalSet level_signals(const Performer& solved, const SignalSet& signals, const Rig& rig, const Performer& level) {
   SignalSet plan = own_plan(level, level_limit(solved, signals.limit, level), signals.activation.harmonics());
-  const Eigen::MatrixXd changes = carried_changes(solved, signals, rig, level.mesh);
+  const Eigen::MatrixXd changes = carried_changes(solved, signals, rig, level);
   if (changes.size() > 0) add_changes(level, changes, plan);
   plan.layers = signals.layers;
   return plan;

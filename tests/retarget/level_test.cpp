@@ -121,14 +121,14 @@ Solved standing_block(int nodes) {
   return made;
 }
 
-/// How far [m] the nodes are from the rest shape, RMS, after 0.15 s under constant activations.
-double sagged(const physics::Scene& scene, const Eigen::VectorXd& activation) {
+/// How far [m] the nodes are from where they start, RMS, after 0.15 s under constant activations.
+double moved(const physics::Scene& scene, const Eigen::Matrix3Xd& start, const Eigen::VectorXd& activation) {
   constexpr double kStep = 1.0 / 480;
-  physics::State state{scene.body.rest, Eigen::Matrix3Xd::Zero(3, scene.body.node_count()), {}};
+  physics::State state{start, Eigen::Matrix3Xd::Zero(3, scene.body.node_count()), {}};
   const auto stepper = physics::make_explicit_stepper(scene);
   physics::Impulses impulses = physics::make_impulses(scene);
   for (int k = 0; k < few_steps(72); ++k) stepper->step(kStep, activation, nullptr, state, impulses);
-  return std::sqrt((state.x - scene.body.rest).colwise().squaredNorm().mean());
+  return std::sqrt((state.x - start).colwise().squaredNorm().mean());
 }
 
 TEST(TensorField, ThatIsTheSameEverywhereIsFoundAndGoesToAnotherMesh) {
@@ -170,8 +170,13 @@ TEST(AtLevel, CarriesAUniformStrainExactly) {
     const Eigen::Matrix3Xd wanted = deform * body.rest;
     EXPECT_LT((level.performer.prepared.target.at(0) - wanted).cwiseAbs().maxCoeff(), 1e-6) << nodes;
     const Eigen::MatrixXd played = signal::synthesise_samples(level.signals.activation, level.signals.samples());
+    ASSERT_EQ(played.cols(), body.edge_count());
     const Eigen::RowVectorXd exact = stress_free(body, deform);
-    EXPECT_LT((played.row(0) - exact).cwiseAbs().maxCoeff(), 1e-5) << nodes;
+    // Elements have more activations than strains: what counts is that they stay as they are.
+    const double most = (played.row(0) - exact).cwiseAbs().maxCoeff();
+    EXPECT_LT(most, hexahedra ? 0.05 : 1e-5) << nodes;
+    const physics::Scene& scene = level.performer.scene;
+    EXPECT_LT(moved(scene, wanted, played.row(0)), 0.03 * moved(scene, wanted, Eigen::VectorXd::Ones(played.cols()))) << nodes;
     EXPECT_EQ(level.signals.samples(), solved.signals.samples());
     EXPECT_EQ(level.performer.muscles.names, solved.performer.muscles.names);
   }
@@ -187,7 +192,8 @@ TEST(AtLevel, StandsWhereTheSolvedCreatureDoes) {
     EXPECT_TRUE(level.performer.prepared.contacts.touching.col(0).any());
     EXPECT_LT((level.performer.prepared.target.at(0) - scene.body.rest).cwiseAbs().maxCoeff(), 2e-3) << nodes;
     const Eigen::VectorXd played = signal::synthesise_samples(level.signals.activation, level.signals.samples()).row(0);
-    EXPECT_LT(sagged(scene, played), 0.2 * sagged(scene, Eigen::VectorXd::Ones(played.size()))) << nodes;
+    const Eigen::Matrix3Xd& rest = scene.body.rest;
+    EXPECT_LT(moved(scene, rest, played), 0.2 * moved(scene, rest, Eigen::VectorXd::Ones(played.size()))) << nodes;
   }
 }
 

@@ -84,7 +84,7 @@ TEST_F(Replay, KeepsItsFeetAndItsWayOnAFinerMeshThatFeelsAnEdit) {
   EXPECT_FALSE(run["fell"]);
   EXPECT_NEAR(run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>(), 1, 0.05);
   const auto motion = [&](const std::string& file) {
-    replay("--lod 110 --duration 0.2 -o " + file);
+    replay("--lod 60 --duration 0.2 -o " + file);
     return io::read_file(directory_.path / file);
   };
   const std::string plain = motion("plain.glb");

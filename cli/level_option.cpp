@@ -25,7 +25,7 @@ double budget_of(const AskedLevel& asked, const std::string& command) {
 void add_level_options(CLI::App& app, AskedLevel& asked) {
   CLI::Option* lod = app.add_option(
       "--lod", asked.lod,
-      "Replay on another control mesh of about so many nodes, 20 to 5000, with the signals carried over; auto: the "
+      "Replay on another control mesh of about so many nodes, 20 to 5000, by a plan of its own with the same edits; auto: the "
       "finest of an eighth, a quarter, half, one, two and four times the creature's that --budget allows and that keeps its way");
   app.add_option("--budget", asked.budget,
                  "2ms: processor time of solver and corrector that a frame of 1/60 s may take, by counted work")

@@ -16,6 +16,7 @@ namespace {
 using Triplets = std::vector<Eigen::Triplet<double>>;
 
 constexpr double kJumps = 1e-3;      // per squared change of the deformation from tet to tet, in cells
+constexpr double kAlike = 1;         // per squared difference of the deformation from the solved creature's there, in cells
 constexpr double kInside = 0.3;      // of the inside beside the skin, where nodes are placed
 constexpr double kTouching = 0.003;  // per D: points of a contact that ended higher bear no load
 
@@ -29,6 +30,16 @@ Eigen::VectorXd vertex_shares(const SkinnedMesh& skin) {
   }
   shares.array() += 1e-6 * shares.mean();
   return shares / shares.sum();
+}
+
+/// 4 x 3: the places of a tet's corners, as rows, times its transpose are the deformation's transpose.
+Eigen::Matrix<double, 4, 3> gradients_of(const ControlMesh& mesh, Eigen::Index t) {
+  Eigen::Matrix3d spans;
+  for (int k = 0; k < 3; ++k) spans.col(k) = mesh.nodes.col(mesh.tets(k + 1, t)) - mesh.nodes.col(mesh.tets(0, t));
+  Eigen::Matrix<double, 4, 3> result;
+  result.bottomRows<3>() = spans.inverse();
+  result.row(0) = -result.bottomRows<3>().colwise().sum();
+  return result;
 }
 
 /// Adds the squared changes of the deformation over the faces between tets.
@@ -46,18 +57,10 @@ void add_jumps(const ControlMesh& mesh, Triplets& terms) {
       if (!is_new) pairs.emplace_back(place->second, t);
     }
   }
-  const auto gradients = [&](Eigen::Index t) {
-    Eigen::Matrix3d spans;
-    for (int k = 0; k < 3; ++k) spans.col(k) = mesh.nodes.col(mesh.tets(k + 1, t)) - mesh.nodes.col(mesh.tets(0, t));
-    Eigen::Matrix<double, 4, 3> result;
-    result.bottomRows<3>() = spans.inverse();
-    result.row(0) = -result.bottomRows<3>().colwise().sum();
-    return result;
-  };
   const double weight = kJumps * std::pow(mesh.cell_size.mean(), 2) / static_cast<double>(pairs.size());
   for (const auto& [a, b] : pairs) {
     Eigen::Matrix<double, 8, 3> jump;
-    jump << gradients(a), -gradients(b);
+    jump << gradients_of(mesh, a), -gradients_of(mesh, b);
     const Eigen::Matrix<double, 8, 8> products = weight * jump * jump.transpose();
     for (int r = 0; r < 8; ++r) {
       for (int c = 0; c < 8; ++c)
@@ -65,6 +68,59 @@ void add_jumps(const ControlMesh& mesh, Triplets& terms) {
     }
   }
 }
+
+/// About each node the mean of the deformation, transposed, of the tets that meet there: 9 x N.
+Eigen::MatrixXd node_deformation(const ControlMesh& mesh, const Eigen::Ref<const Eigen::Matrix3Xd>& x) {
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(9, mesh.node_count());
+  Eigen::RowVectorXd count = Eigen::RowVectorXd::Zero(mesh.node_count());
+  for (Eigen::Index t = 0; t < mesh.tets.cols(); ++t) {
+    const Eigen::Matrix3d deformation = gradients_of(mesh, t).transpose() * x(Eigen::all, mesh.tets.col(t)).transpose();
+    for (const int i : mesh.tets.col(t)) {
+      sum.col(i) += deformation.reshaped();
+      ++count[i];
+    }
+  }
+  return sum.array().rowwise() / count.array();
+}
+
+/// Asks of the level's tets to be deformed as the solved creature is there. A coarse mesh that goes by its skin alone strains
+/// itself far beyond what muscles can follow.
+class Likeness {
+ public:
+  Likeness(const Performer& solved, const Rig& rig, const ControlMesh& mesh)
+      : solved_(solved), mesh_(mesh), weight_(kAlike * std::pow(mesh.cell_size.mean(), 2) / static_cast<double>(mesh.tets.cols())) {
+    Eigen::Matrix3Xd middles(3, mesh.tets.cols());
+    Eigen::MatrixXd bones(mesh.bone_weights.rows(), mesh.tets.cols());
+    for (Eigen::Index t = 0; t < mesh.tets.cols(); ++t) {
+      middles.col(t) = mesh.nodes(Eigen::all, mesh.tets.col(t)).rowwise().mean();
+      bones.col(t) = mesh.bone_weights(Eigen::all, mesh.tets.col(t)).rowwise().mean();
+    }
+    places_ = locate(solved.mesh, rig.bone_weights, middles, bones);
+  }
+  void add_to(Triplets& terms) const {
+    for (Eigen::Index t = 0; t < mesh_.tets.cols(); ++t) {
+      const Eigen::Matrix<double, 4, 3> gradients = gradients_of(mesh_, t);
+      const Eigen::Matrix4d products = weight_ * gradients * gradients.transpose();
+      for (int r = 0; r < 4; ++r) {
+        for (int c = 0; c < 4; ++c) terms.emplace_back(mesh_.tets(r, t), mesh_.tets(c, t), products(r, c));
+      }
+    }
+  }
+  /// Of a frame, N x 3.
+  void add_to(Eigen::MatrixXd& right, Eigen::Index f) const {
+    const Eigen::MatrixXd deformation = node_deformation(solved_.mesh, solved_.prepared.target.at(f));
+    for (Eigen::Index t = 0; t < mesh_.tets.cols(); ++t) {
+      const Eigen::Vector<double, 9> wanted = deformation(Eigen::all, places_.nodes.col(t)) * places_.weights.col(t);
+      right(mesh_.tets.col(t), Eigen::all) += weight_ * gradients_of(mesh_, t) * wanted.reshaped(3, 3);
+    }
+  }
+
+ private:
+  const Performer& solved_;
+  const ControlMesh& mesh_;
+  double weight_;
+  Places places_;
+};
 
 /// The target on the nodes of the level.
 Motion carried_motion(const Performer& solved, const Rig& rig, const Creature& level) {
@@ -74,6 +130,8 @@ Motion carried_motion(const Performer& solved, const Rig& rig, const Creature& l
   const Eigen::VectorXd shares = vertex_shares(rig.skin);
   Triplets terms;
   add_jumps(mesh, terms);
+  const Likeness likeness(solved, rig, mesh);
+  likeness.add_to(terms);
   for (Eigen::Index v = 0; v < level.skin.count(); ++v) {
     for (int r = 0; r < 4; ++r) {
       for (int c = 0; c < 4; ++c) {
@@ -104,6 +162,7 @@ Motion carried_motion(const Performer& solved, const Rig& rig, const Creature& l
       for (int c = 0; c < 4; ++c)
         right.row(i) += inner * inside.weights(c, i) * target.at(f).col(inside.nodes(c, i)).transpose();
     }
+    likeness.add_to(right, f);
     carried.at(f) = factor.solve(right).transpose();
   }
   return carried;

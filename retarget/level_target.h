@@ -5,7 +5,7 @@
 namespace hydrostat::retarget {
 
 /// The solved creature's prepared target on the mesh of `level`, which is the same character's. Nodes go where skin and
-/// inside are, with as little change of the deformation from tet to tet as that leaves open; patches keep what they do by
+/// inside are, and where tets are deformed as the solved ones there; patches keep what they do by
 /// the bones they belong to; then contacts, volume and balance are restored as the preparation does it, else the body would
 /// not follow.
 PreparedTarget carried_target(const Performer& solved, const Rig& rig, const Creature& level);

@@ -14,6 +14,7 @@
 #include "io/creature_scene.h"
 #include "io/load_creature.h"
 #include "retarget/error.h"
+#include "retarget/level.h"
 #include "retarget/performance.h"
 
 namespace hydrostat {
@@ -35,8 +36,9 @@ struct Slope {
   }
 };
 
-/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; or of the ground: "slope=5:side=90".
-void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Slope& slope) {
+/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; of the ground: "slope=5:side=90"; or of the
+/// control mesh: "lod=52", as replay has it, with calmer feedback where it falls.
+void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Slope& slope, double& nodes) {
   retarget::CorrectorOptions& options = replay.corrector;
   const std::map<std::string, double*> knobs{{"effort", &options.effort},       {"settle", &options.settle_s},
                                              {"nodes", &options.node_weight},   {"root", &options.root_weight},
@@ -46,6 +48,7 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
                                              {"clearance", &options.clearance},
                                              {"calm", &options.calm},         {"calm_error", &options.calm_error},
                                              {"slope", &slope.degrees},       {"side", &slope.side},
+                                             {"lod", &nodes},
                                              {"noise", &replay.observation.noise_m},
                                              {"delay", &replay.observation.delay_s}};
   std::istringstream parts(variant);
@@ -97,6 +100,15 @@ void write_frames(const std::string& file, const retarget::Performer& performer,
   out << "]}\n";
 }
 
+/// On another control mesh, as replay --lod has it.
+void take_level(const std::string& directory, double nodes, io::LoadedCreature& creature) {
+  retarget::CreatureOptions options = io::level_options(creature);
+  options.nodes = static_cast<int>(nodes);
+  retarget::Level level = retarget::at_level(creature.target.performer, creature.signals, io::load_rig(directory, creature), options);
+  creature.target.performer = std::move(level.performer);
+  creature.signals = std::move(level.signals);
+}
+
 int run(int argc, char** argv) {
   if (argc < 6) {
     std::cerr << "usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json|- [SCENE.toml]]\n";
@@ -109,7 +121,9 @@ int run(int argc, char** argv) {
   const retarget::Motion& target = performer.prepared.target;
   retarget::PerformOptions options;
   Slope slope;
-  set_variant(variant, options.replay, slope);
+  double nodes = 0;  // of the level of detail; 0: the creature itself
+  set_variant(variant, options.replay, slope, nodes);
+  if (nodes > 0) take_level(directory, nodes, creature);
   if (argc > 7) io::put_in_scene(argv[7], performer);
   slope.tilt(performer.scene.gravity);
   options.replay.duration_s = target.loop ? std::atof(argv[5]) * target.duration_s() : retarget::usual_duration(target);
@@ -122,7 +136,8 @@ int run(int argc, char** argv) {
   const double angle = 2 * M_PI * static_cast<double>(random()) / 4294967296.0;
   if (seed != 0) options.replay.pushes.push_back(shove(0, angle, kFirstShove * static_cast<double>(random()) / 4294967296.0));
   if (push != "none") options.replay.pushes.push_back(parse_push(push, target.loop ? target.duration_s() : 0.25));
-  const retarget::Replay replay = *retarget::perform(performer, creature.signals, options).closed_loop;
+  const auto& let_go = nodes > 0 ? retarget::perform_calmly : retarget::perform;
+  const retarget::Replay replay = *let_go(performer, creature.signals, options).closed_loop;
   const retarget::ReplayReport& r = replay.report;
   const double travel = r.clip_travel_per_cycle_length > 0.01 ? r.travel_per_cycle_length / r.clip_travel_per_cycle_length : 1;
   std::printf("%s,%d,%.4g,%.3f,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g\n", r.fell ? "fell" : "up", target.loop ? 1 : 0, r.cycles,

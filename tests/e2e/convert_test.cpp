@@ -25,11 +25,12 @@ struct Gate {
   double drift;                         // [per L a cycle] at most
   double apex;                          // of a jump: at most so far from the clip's rise, as a share of it; 0: not in the air
   bool walks_on_legs;                   // all that touches the ground
+  bool has_levels;                      // goes on a quarter of its nodes, too
 };
 constexpr Gate kGates[] = {
-    {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.92, 1.08, 0.003, 0, false},
-    {"boxdog_trot.fbx", "loop", true, 14.99, 0.01, 0.04, 0.92, 1.08, 0.003, 0, true},
-    {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.25, true},
+    {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.92, 1.08, 0.003, 0, false, false},
+    {"boxdog_trot.fbx", "loop", true, 14.99, 0.01, 0.04, 0.92, 1.08, 0.003, 0, true, true},
+    {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.25, true, false},
 };
 constexpr double kHeading = 0.3;  // [deg] a cycle
 // Of the inverse dynamics, on every sample.
@@ -158,6 +159,16 @@ void expect_honest_trace(const fs::path& directory, const std::string& creature)
   EXPECT_EQ(audit.correction_ns, 0);
 }
 
+/// On a quarter of its nodes.
+void expect_coarse_level(const fs::path& directory) {
+  EXPECT_EQ(hydrostat_in(directory, "replay creature --quiet --lod 52 --cycles 8 --json").exit_code, 0);
+  const json report = report_of(directory / "creature"), run = report["replay"]["closed_loop"];
+  EXPECT_LE(report["level"]["nodes"].get<double>(), 0.26 * report["level"]["solved_nodes"].get<double>());
+  EXPECT_FALSE(run["fell"]);
+  EXPECT_LE(run["shape_rms_length"], 0.01);
+  EXPECT_NEAR(run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>(), 1, 0.05);
+}
+
 void expect_sample(const Gate& gate) {
   SCOPED_TRACE(gate.clip);
   const TemporaryDirectory directory;
@@ -168,6 +179,7 @@ void expect_sample(const Gate& gate) {
   expect_gate(directory.path / "creature", gate);
   expect_honest_trace(directory.path, "creature");
   if (gate.apex > 0) expect_jump(directory.path / "creature", directory.path / "trace", gate.apex);
+  if (gate.has_levels) expect_coarse_level(directory.path);
 }
 
 TEST(Convert, LetsTheWormCrawlByItself) { expect_sample(kGates[0]); }

@@ -76,6 +76,22 @@ TEST_F(Replay, OnOtherLevelsIsTheSameEachTimeAndRefusesWhatCannotBe) {
   EXPECT_NE(old.err.find("rig.bin"), std::string::npos) << old.err;
 }
 
+TEST_F(Replay, KeepsItsFeetAndItsWayOnAFinerMeshThatFeelsAnEdit) {
+  const Outcome outcome = replay("--lod 110 --cycles 8 --json");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json report = report_of(creature_), run = report["replay"]["closed_loop"];
+  EXPECT_GT(report["level"]["nodes"], 2 * report["level"]["solved_nodes"].get<int>());
+  EXPECT_FALSE(run["fell"]);
+  EXPECT_NEAR(run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>(), 1, 0.05);
+  const auto motion = [&](const std::string& file) {
+    replay("--lod 60 --duration 0.2 -o " + file);
+    return io::read_file(directory_.path / file);
+  };
+  const std::string plain = motion("plain.glb");
+  hydrostat_in(directory_.path, "signals creature gain --bone '*' --factor 0.9");
+  EXPECT_NE(motion("edited.glb"), plain);
+}
+
 TEST_F(Replay, WobblesInThePictureAlone) {
   const auto motion = [&](const std::string& name, const std::string& options) {
     const Outcome outcome = replay("--duration 0.5 -o " + name + ".glb --trace " + name + " " + options);

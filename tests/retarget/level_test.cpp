@@ -9,9 +9,9 @@
 #include <random>
 #include <utility>
 
-#include "retarget/bear_loads.h"
 #include "retarget/corrector.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/inverse_dynamics.h"
 #include "retarget/level_cost.h"
 #include "retarget/step_cost.h"
 #include "retarget/tensor_field.h"
@@ -114,20 +114,21 @@ Solved standing_block(int nodes) {
   contacts.patches = {sole};
   contacts.state = {std::vector<ContactState>(static_cast<std::size_t>(frames), ContactState::kStick)};
   contacts.sliding_x = contacts.sliding_z = Eigen::MatrixXd::Zero(1, frames);
-  Eigen::MatrixXd activation = Eigen::MatrixXd::Ones(performer.scene.body.edge_count(), frames);
-  bear_loads(performer, activation);
-  set_signals(activation.col(0).transpose(), made);
+  InverseOptions inverse;
+  inverse.limit = kLimit;
+  const InverseDynamics found = solve_inverse_dynamics(performer.prepared, performer.scene, performer.length, inverse);
+  set_signals(found.activation.col(0).transpose(), made);
   return made;
 }
 
-/// How far [m] the nodes are from the rest shape, RMS, after 0.15 s under constant activations.
-double sagged(const physics::Scene& scene, const Eigen::VectorXd& activation) {
+/// How far [m] the nodes are from where they start, RMS, after 0.15 s under constant activations.
+double moved(const physics::Scene& scene, const Eigen::Matrix3Xd& start, const Eigen::VectorXd& activation) {
   constexpr double kStep = 1.0 / 480;
-  physics::State state{scene.body.rest, Eigen::Matrix3Xd::Zero(3, scene.body.node_count()), {}};
+  physics::State state{start, Eigen::Matrix3Xd::Zero(3, scene.body.node_count()), {}};
   const auto stepper = physics::make_explicit_stepper(scene);
   physics::Impulses impulses = physics::make_impulses(scene);
   for (int k = 0; k < few_steps(72); ++k) stepper->step(kStep, activation, nullptr, state, impulses);
-  return std::sqrt((state.x - scene.body.rest).colwise().squaredNorm().mean());
+  return std::sqrt((state.x - start).colwise().squaredNorm().mean());
 }
 
 TEST(TensorField, ThatIsTheSameEverywhereIsFoundAndGoesToAnotherMesh) {
@@ -169,8 +170,13 @@ TEST(AtLevel, CarriesAUniformStrainExactly) {
     const Eigen::Matrix3Xd wanted = deform * body.rest;
     EXPECT_LT((level.performer.prepared.target.at(0) - wanted).cwiseAbs().maxCoeff(), 1e-6) << nodes;
     const Eigen::MatrixXd played = signal::synthesise_samples(level.signals.activation, level.signals.samples());
+    ASSERT_EQ(played.cols(), body.edge_count());
     const Eigen::RowVectorXd exact = stress_free(body, deform);
-    EXPECT_LT((played.row(0) - exact).cwiseAbs().maxCoeff(), 1e-5) << nodes;
+    // Elements have more activations than strains: what counts is that they stay as they are.
+    const double most = (played.row(0) - exact).cwiseAbs().maxCoeff();
+    EXPECT_LT(most, hexahedra ? 0.05 : 1e-5) << nodes;
+    const physics::Scene& scene = level.performer.scene;
+    EXPECT_LT(moved(scene, wanted, played.row(0)), 0.03 * moved(scene, wanted, Eigen::VectorXd::Ones(played.cols()))) << nodes;
     EXPECT_EQ(level.signals.samples(), solved.signals.samples());
     EXPECT_EQ(level.performer.muscles.names, solved.performer.muscles.names);
   }
@@ -186,8 +192,52 @@ TEST(AtLevel, StandsWhereTheSolvedCreatureDoes) {
     EXPECT_TRUE(level.performer.prepared.contacts.touching.col(0).any());
     EXPECT_LT((level.performer.prepared.target.at(0) - scene.body.rest).cwiseAbs().maxCoeff(), 2e-3) << nodes;
     const Eigen::VectorXd played = signal::synthesise_samples(level.signals.activation, level.signals.samples()).row(0);
-    EXPECT_LT(sagged(scene, played), 0.2 * sagged(scene, Eigen::VectorXd::Ones(played.size()))) << nodes;
+    const Eigen::Matrix3Xd& rest = scene.body.rest;
+    EXPECT_LT(moved(scene, rest, played), 0.2 * moved(scene, rest, Eigen::VectorXd::Ones(played.size()))) << nodes;
   }
+}
+
+/// What the level plays in its first frame.
+Eigen::VectorXd played(const Level& level) {
+  return signal::synthesise_samples(level.signals.activation, level.signals.samples()).row(0);
+}
+
+// Edits of the coefficients themselves: what they add to the squares of the activations is the same tensor everywhere.
+TEST(AtLevel, FeelsWhatWasDoneToTheSolvedSignals) {
+  Solved solved = standing_block(40);
+  const physics::Body& body = solved.performer.scene.body;
+  const Eigen::RowVectorXd before = signal::synthesise_samples(solved.signals.activation, solved.signals.samples()).row(0);
+  const Level plain = at_level(solved.performer, solved.signals, solved.rig, options_for(90, false));
+  const physics::Body& of_level = plain.performer.scene.body;
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    std::mt19937 random(seed);
+    const Eigen::Matrix3d tensor = 0.05 * drawn_tensor(random);
+    const auto along = [&tensor](const physics::Body& of, int e) {
+      const Eigen::Vector3d n = (of.rest.col(of.edges(1, e)) - of.rest.col(of.edges(0, e))).normalized();
+      return n.dot(tensor * n);
+    };
+    Eigen::RowVectorXd edited = before;
+    for (int e = 0; e < body.edge_count(); ++e) edited[e] = std::sqrt(before[e] * before[e] + along(body, e));
+    set_signals(edited, solved);
+    const Eigen::VectorXd after = played(at_level(solved.performer, solved.signals, solved.rig, options_for(90, false)));
+    const Eigen::VectorXd change = after.cwiseAbs2() - played(plain).cwiseAbs2();
+    for (int e = 0; e < of_level.edge_count(); ++e) EXPECT_NEAR(change[e], along(of_level, e), 1e-4) << "seed " << seed << ", constraint " << e;
+  }
+}
+
+// A user who narrows the muscles' reach has them narrower on the levels, too; layers come along as they are.
+TEST(AtLevel, KeepsTheLimitAndTheLayersOfTheSolvedCreature) {
+  Solved solved = standing_block(40);
+  signal::Layer layer;
+  layer.name = "stronger";
+  solved.signals.layers.push_back(layer);
+  const Level wide = at_level(solved.performer, solved.signals, solved.rig, options_for(90, false));
+  solved.signals.limit = kLimit / 3;
+  const Level narrow = at_level(solved.performer, solved.signals, solved.rig, options_for(90, false));
+  EXPECT_NEAR(narrow.signals.limit, wide.signals.limit / 3, 1e-12);
+  EXPECT_LE((played(narrow).array() - 1).abs().maxCoeff(), narrow.signals.limit + 1e-6);
+  ASSERT_EQ(wide.signals.layers.size(), 1u);
+  EXPECT_EQ(wide.signals.layers[0].name, layer.name);
 }
 
 TEST(LevelCosts, FallWithTheNodesAndAreTheSameEachTime) {

@@ -10,6 +10,8 @@
 namespace hydrostat::retarget {
 namespace {
 
+constexpr double kLedFoot = 3;  // times as much weighs a foot on uneven ground, where it is to be put in a place
+
 /// 3N: the squared weight of each row of nodes.
 Eigen::VectorXd shares_of_nodes(const physics::Body& body, double weight) {
   return (weight * weight / body.mass.sum()) * body.mass.transpose().replicate<3, 1>().reshaped();
@@ -89,7 +91,7 @@ void Corrector::weigh_feet(const physics::State& state, const physics::State& re
     auto mean = weighted_.middleRows<3>(row);
     mean.setZero();
     Eigen::Vector3d error = -step;
-    if (!contact.lift.empty()) error -= contact.lift[k] * up;
+    if (!contact.lead.empty()) error -= contact.lead[k];
     const double share = 1 / static_cast<double>(foot->points.size());
     for (const int p : foot->points) {
       for (int c = 0; c < scene_.contact_points.nodes.rows(); ++c) {
@@ -101,7 +103,7 @@ void Corrector::weigh_feet(const physics::State& state, const physics::State& re
       error += share * (scene_.contact_points.of(state.x, p) - scene_.contact_points.of(reference.x, p));
     }
     mean.col(last) += error / options_.foot_settle_s;
-    mean *= options_.foot_weight / speed_unit_;
+    mean *= (contact.lead.empty() ? 1 : kLedFoot) * options_.foot_weight / speed_unit_;
     row += 3;
   }
 }

@@ -20,7 +20,7 @@ struct CorrectorOptions {
   double foot_weight = 4;       // of the rows of a foot in the air
   double foot_settle_s = 0.1;   // tau of a foot in the air
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
-  double clearance = 0.02;      // of L: over what a foot in the air is to step onto or across
+  double clearance = 0.03;      // of L: over what a foot in the air is to step onto or across
   double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
   int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
 };
@@ -31,7 +31,7 @@ struct ContactNow {
   Eigen::Matrix3Xd force;              // 3 x P [N], of the control step before
   std::vector<bool> bearing;           // P: by plan it bears load now and until the horizon's end
   std::vector<const Patch*> in_air;    // patches on legs that touch nothing; they must outlive the call
-  std::vector<double> lift;            // [m] of each of them: by how much what lies ahead raises it over its reference; empty: none
+  std::vector<Eigen::Vector3d> lead;   // [m] of each of them: by how much what lies ahead moves it from its reference; empty: not
   double grip = 1;  // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
                     // friction sets the ground's sideways force, and pushing harder only slips more
 };

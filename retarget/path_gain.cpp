@@ -2,10 +2,18 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace hydrostat::retarget {
 namespace {
+
+constexpr double kLyingEffort = 20;  // times as much
+
+/// It bears itself by its trunk alone.
+bool lies(const ContactSchedule& contacts) {
+  return !contacts.patches.empty() && std::none_of(contacts.patches.begin(), contacts.patches.end(), [](const Patch& patch) { return patch.on_leg; });
+}
 
 /// How far momentum and spin of the path are from the target's, with the error of place that they are to make up for, in speeds per
 /// sqrt(g L): the corrector's error of momentum there. f is a sample of the path.
@@ -31,6 +39,7 @@ double momentum_error(const ReplayInput& input, const MotionCurve& target, doubl
 
 CorrectorOptions gain_on_path(const ReplayInput& input, const CorrectorOptions& options) {
   CorrectorOptions result = options;
+  if (lies(input.prepared.contacts)) result.effort *= kLyingEffort;
   if (!input.path || input.path->is_empty() || input.scene.gravity.isZero(0)) return result;
   const MotionCurve target(input.prepared.target);
   const Eigen::Index samples = input.path->place.count();

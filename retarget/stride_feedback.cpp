@@ -17,6 +17,7 @@ constexpr double kMostHeading = 0.2;   // [rad], towards the path
 // Bend by error of heading. Ends that stick would turn the body by the whole bend in a cycle; a soft body on ends that
 // slip turns by a twentieth (worm), so that this closes an error in about a cycle.
 constexpr double kBendPerTurn = 20;
+constexpr double kMostBend = 0.3;      // [rad]; a body that is bent further tips over its own arch
 
 Eigen::Vector3d level(const Eigen::Vector3d& v) { return {v.x(), 0, v.z()}; }
 
@@ -54,7 +55,7 @@ void StrideFeedback::learn_to_steer(const Motion& target, const Eigen::Vector3d&
     const Eigen::Vector3d from = target.at(0).col(constraints(0, e)), to = target.at(0).col(constraints(1, e));
     bend_[e] = right.dot((from + to) / 2 - centre) * std::pow((to - from).normalized().dot(way), 2) / middle;
   }
-  most_steering_ = kMost / std::max(bend_.cwiseAbs().maxCoeff(), kMost);
+  most_steering_ = std::min(kMost / bend_.cwiseAbs().maxCoeff(), kMostBend);
 }
 
 void StrideFeedback::follow(const RigidFit& fit, double seconds) {

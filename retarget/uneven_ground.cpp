@@ -13,6 +13,10 @@ constexpr double kUneven = 2e-3;       // per L: less is no step
 constexpr double kSmooth = 0.1;        // [s] in which the reference follows the ground
 constexpr double kNarrow = 0.1;        // per L: feet that stand nearer to each other tell little of a slope
 constexpr int kMostMarches = 64;
+constexpr double kFoothold = 0.01;     // per L: between places that a foot may land on
+constexpr int kFarthest = 8;           // of those from where it would land
+constexpr int kFromEdge = 2;           // of those: so far off an edge a foot is to stand
+constexpr double kStay = 0.5;          // what leaving a chosen place costs, against what going there does
 
 /// The outermost of a patch's points to four sides, in the target's first frame.
 std::vector<int> outermost(const Patch& patch, const Eigen::Ref<const Eigen::Matrix3Xd>& places) {
@@ -80,6 +84,44 @@ double UnevenGround::highest(const Foot& foot, double time_s, const RigidFit& fi
   return highest;
 }
 
+/// Where it would land at a time across an edge or beside one, another place on its way, the nearest that is level. Returns the height
+/// of that place.
+double UnevenGround::choose_foothold(Foot& foot, double time_s, const RigidFit& fit, const physics::State& state) {
+  Eigen::Matrix3Xd x, v;
+  curve_.at(time_s, x, v);
+  Eigen::Matrix3Xd landing(3, static_cast<Eigen::Index>(foot.points.size()));
+  for (std::size_t k = 0; k < foot.points.size(); ++k) landing.col(static_cast<Eigen::Index>(k)) = fit.rotation * (x.col(foot.points[k]) - fit.mean_a) + fit.mean_b;
+  const Eigen::Vector3d to = landing.rowwise().mean() - foot.place;
+  const Eigen::Vector3d way = Eigen::Vector3d(to.x(), 0, to.z()).normalized() * kFoothold * length_;
+  const auto range = [&](int from, int until) {
+    std::pair<double, double> heights(1e300, -1e300);
+    for (Eigen::Index k = 0; k < landing.cols(); ++k) {
+      for (int step = from; step <= until; ++step) {
+        const double height = height_at(landing.col(k) + step * way, state);
+        heights = {std::min(heights.first, height), std::max(heights.second, height)};
+      }
+    }
+    return heights;
+  };
+  const auto is_level = [&](const std::pair<double, double>& heights) { return heights.second - heights.first < kUneven * length_; };
+  const auto here = range(-kFromEdge, kFromEdge);
+  if (is_level(here)) {
+    foot.aside.setZero();
+    return here.second;
+  }
+  double least = 1e300, height = here.second;
+  Eigen::Vector3d chosen = Eigen::Vector3d::Zero();
+  for (int step = -kFarthest; step <= kFarthest; ++step) {
+    const double cost = way.norm() * std::abs(step) + kStay * (step * way - foot.aside).norm();
+    if (cost >= least) continue;
+    const auto there = range(step - kFromEdge, step + kFromEdge);
+    if (!is_level(there)) continue;
+    least = cost, chosen = step * way, height = there.second;
+  }
+  foot.aside = chosen;
+  return height;
+}
+
 void UnevenGround::look_ahead(Foot& foot, double time_s, double seconds, const RigidFit& fit, const physics::State& state) {
   double here = 0;
   foot.place.setZero();
@@ -90,9 +132,10 @@ void UnevenGround::look_ahead(Foot& foot, double time_s, double seconds, const R
   }
   const long ahead = frames_to_landing(foot, time_s);
   double landing = here, most = here;
+  if (ahead == 0) foot.aside.setZero();
   if (ahead > 0) {
     const double rate = plan_.target.rate_hz;
-    landing = highest(foot, time_s + static_cast<double>(ahead) / rate, fit, state);
+    landing = choose_foothold(foot, time_s + static_cast<double>(ahead) / rate, fit, state);
     most = std::max(most, landing);
     for (long f = 2; f < ahead; f += 2) most = std::max(most, highest(foot, time_s + static_cast<double>(f) / rate, fit, state));
   }
@@ -134,11 +177,11 @@ void UnevenGround::apply(const Eigen::Vector3d& com, physics::State& reference) 
   }
 }
 
-void UnevenGround::lift(const std::vector<const Patch*>& feet, std::vector<double>& lifts) const {
-  lifts.clear();
+void UnevenGround::lead(const std::vector<const Patch*>& feet, std::vector<Eigen::Vector3d>& moves) const {
+  moves.clear();
   for (const Patch* patch : feet) {
     const auto foot = std::find_if(feet_.begin(), feet_.end(), [&](const Foot& f) { return f.patch == patch; });
-    lifts.push_back(foot == feet_.end() ? 0 : foot->lift - plane_at(foot->place));
+    moves.push_back(foot == feet_.end() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(foot->aside + (foot->lift - plane_at(foot->place)) * Eigen::Vector3d::UnitY()));
   }
 }
 

@@ -21,8 +21,8 @@ class UnevenGround {
   void look(double time_s, double seconds, const RigidFit& fit, const physics::State& state);
   /// Raises and tilts a reference whose centre of mass is `com`.
   void apply(const Eigen::Vector3d& com, physics::State& reference) const;
-  /// By how much feet are to be lifted over that reference [m].
-  void lift(const std::vector<const Patch*>& feet, std::vector<double>& lifts) const;
+  /// By how much feet are to be moved from that reference [m]: lifted, and drawn aside from an edge.
+  void lead(const std::vector<const Patch*>& feet, std::vector<Eigen::Vector3d>& moves) const;
   /// Height [m] of the top at a place over the level ground.
   double height_at(const Eigen::Vector3d& place, const physics::State& state) const;
 
@@ -33,10 +33,12 @@ class UnevenGround {
     std::vector<int> points;      // of the patch, the outermost to four sides
     double ground = 0;            // [m] under it, or where it lands; smoothed
     double lift = 0;              // [m] over the level ground
+    Eigen::Vector3d aside = Eigen::Vector3d::Zero();  // [m] from where it would land to where it is to
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of its middle
   };
   long frames_to_landing(const Foot& foot, double time_s) const;
   double highest(const Foot& foot, double time_s, const RigidFit& fit, const physics::State& state) const;
+  double choose_foothold(Foot& foot, double time_s, const RigidFit& fit, const physics::State& state);
   void look_ahead(Foot& foot, double time_s, double seconds, const RigidFit& fit, const physics::State& state);
   double plane_at(const Eigen::Vector3d& place) const;
 

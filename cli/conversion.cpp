@@ -1,12 +1,13 @@
 #include "cli/conversion.h"
 
-#include <cmath>
 #include <filesystem>
 #include <iostream>
 
 #include "cli/choice_record.h"
+#include "cli/conversion_report.h"
 #include "cli/make_performer.h"
 #include "cli/outcome.h"
+#include "cli/stage_key.h"
 #include "cli/wobble_option.h"
 #include "io/body_file.h"
 #include "io/creature_record.h"
@@ -18,9 +19,7 @@
 #include "io/stage_records.h"
 #include "io/wobble_file.h"
 #include "retarget/com_path.h"
-#include "retarget/error.h"
 #include "retarget/flight.h"
-#include "retarget/performed_scenario.h"
 #include "retarget/prepare_standing.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
@@ -30,15 +29,6 @@ namespace hydrostat::cli {
 namespace fs = std::filesystem;
 
 namespace {
-
-/// The key of a stage: all that the stage before depends on, and what this one adds.
-template <typename... Values>
-std::string key_after(const std::string& before, const Values&... values) {
-  io::Fingerprint fingerprint;
-  fingerprint.add("before", before);
-  (fingerprint.add("value", values), ...);
-  return fingerprint.hex();
-}
 
 /// What the body depends on: this program and what was read, wherever its bytes lie (a glTF file may have them beside it).
 std::string key_of(const io::ImportedCharacter& imported) {
@@ -50,79 +40,6 @@ std::vector<std::string> keep_earlier_layers(const fs::path& creature, retarget:
   const fs::path file = creature / "signals.json";
   if (!io::is_creature(creature) || !fs::exists(file)) return {};
   return retarget::keep_layers(io::read_signals(file), signals);
-}
-
-retarget::SourceReport source_report(const ConvertOptions& options, const retarget::Creature& creature,
-                                     const retarget::ImportedMotion& motion) {
-  const retarget::Clip& clip = creature.character.clip;
-  retarget::SourceReport report;
-  report.file = options.clip_file;
-  report.sha256 = io::file_sha256(options.clip_file);
-  report.clip = clip.name;
-  report.root_motion = motion.root_motion;
-  report.duration_s = clip.duration_s;
-  report.rate_hz = clip.key_rate_hz;
-  report.scale = creature.scale;
-  return report;
-}
-
-retarget::BodyReport body_report(const retarget::Creature& creature) {
-  retarget::BodyReport report;
-  report.nodes = creature.mesh.node_count();
-  const physics::Body& body = creature.scene.body;
-  report.elements = body.elements.empty() ? body.tet_count() : body.elements.front().block.element_count();
-  report.constraints = body.edge_count();
-  report.vertices = static_cast<int>(creature.character.skin.vertices.cols());
-  report.pieces = retarget::count_pieces(creature.mesh.tets);
-  report.bridged_cells = creature.mesh.bridged_cells;
-  report.copied_cells = creature.mesh.copied_cells;
-  report.mass_kg = creature.scene.body.mass.sum();
-  report.length_m = creature.length;
-  report.size_m = creature.size;
-  report.youngs_modulus_pa =
-      body.elements.empty() ? creature.youngs_modulus : body.elements.front().materials.front().youngs_modulus;
-  return report;
-}
-
-io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
-                                   const std::optional<ChosenStep>& chosen, double effort, int nodes) {
-  io::CreatureRecord record;
-  record.source_file = fs::absolute(options.clip_file).string();
-  record.source_sha256 = report.source.sha256;
-  record.clip = report.source.clip;
-  record.clip_rise_m = performer.clip_rise;
-  record.settings = {{"height", options.height},
-                     {"nodes", std::int64_t{nodes}},
-                     {"root-motion", options.root_motion},
-                     {"limit", report.inverse.limit},
-                     {"limit-chosen-by", options.limit == "auto" ? std::string("auto") : std::string("user")},
-                     {"element", report.accuracy.element},
-                     {"material", report.accuracy.material},
-                     {"calibrated", options.calibrated},
-                     {"method", report.accuracy.method},
-                     {"friction", options.friction},
-                     {"wobble", options.wobble},
-                     {"polish", options.polish},
-                     {"seed", std::int64_t{options.seed}}};
-  for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
-  if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
-  if (!options.import.up.empty()) record.settings.emplace_back("up", options.import.up);
-  if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
-  if (options.import.from_s > 0) record.settings.emplace_back("from", options.import.from_s);
-  if (options.import.to_s) record.settings.emplace_back("to", *options.import.to_s);
-  if (!options.scene.empty()) record.settings.emplace_back("scene", fs::absolute(options.scene).string());
-  if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
-  if (effort != 1) record.settings.emplace_back("corrector_effort", effort);
-  for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
-  return record;
-}
-
-retarget::PolishReport polish_report(int rounds, const retarget::Performances& before, const retarget::Performances& after) {
-  const auto stays_up = [](const retarget::Performances& runs) {
-    const retarget::ReplayReport& open = runs.open_loop->report;
-    return open.fell ? open.fall_time_s : open.duration_s;
-  };
-  return {rounds, before.main().report.correction_rms, after.main().report.correction_rms, stays_up(before), stays_up(after)};
 }
 
 Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
@@ -221,129 +138,6 @@ void Conversion::solve_signals() {
   target_file_ = io::target_bytes(target_);  // before what a replay will tell anew
   add_warnings(keep_earlier_layers(options_.out, signals_));
   signals_text_ = io::signals_text(signals_);
-}
-
-void Conversion::choose(const io::ImportedCharacter& imported, double wished_limit) {
-  whole_signals_ = signals_;
-  choice_key_ = key_after(key_, signals_text_, options_.method, options_.accuracy.grade, options_.accuracy.max_error,
-                          std::int64_t{options_.nodes}, std::int64_t{options_.seed}, scene_text_);
-  if (const std::optional<io::Record> record = stages_.cache().load("accuracy", choice_key_)) {
-    choice_key_.clear();
-    chosen_ = choice_of(*record);
-    repeat_choice(imported, wished_limit);
-    return;
-  }
-  stages_.run("accuracy", [&] {
-    choose_steps();
-    return 0;
-  });
-  perform_within_error();
-  if (settings_.nodes > 0 || !chosen_->report.is_met() || is_down(performances_.main())) return;
-  stages_.run("resolution", [&] {
-    choose_nodes(imported, wished_limit);
-    return 0;
-  });
-}
-
-void Conversion::repeat_choice(const io::ImportedCharacter& imported, double wished_limit) {
-  add_warnings(chosen_->warnings);
-  cut_signals();
-  if (chosen_->wished_nodes == 0) return;
-  Progress silent(std::cerr, ProgressStyle::silent);
-  Stages stages = coarser_stages(silent);
-  const std::unique_ptr<Conversion> coarser = on_coarser_mesh(imported, wished_limit, chosen_->wished_nodes, stages);
-  coarser->perform();
-  take_over(*coarser);
-}
-
-Stages Conversion::coarser_stages(Progress& progress) const {
-  Stages stages(progress);
-  stages.use_cache(writer_.cache_directory() / "coarser");
-  return stages;
-}
-
-void Conversion::choose_steps() {
-  const std::optional<physics::Method> only = options_.method == "auto" ? std::nullopt : std::optional(settings_.method);
-  chosen_ = choose_step(options_.accuracy, "hydrostat convert", target_.performer, signals_, only);
-  cut_harmonics(*chosen_, target_.performer, signals_);
-  tell_signals();
-}
-
-void Conversion::cut_signals() {
-  signals_ = chosen_->harmonics > 0 ? retarget::with_harmonics(whole_signals_, chosen_->harmonics) : whole_signals_;
-  tell_signals();
-}
-
-void Conversion::choose_nodes(const io::ImportedCharacter& imported, double wished_limit) {
-  constexpr int kFewest = 20;  // as --nodes has it
-  const int own = creature_.mesh.node_count();
-  int last = 0;
-  Progress silent(std::cerr, ProgressStyle::silent);
-  Stages stages = coarser_stages(silent);
-  for (const double part : {0.25, 0.35, 0.5, 0.7}) {
-    const int wished = static_cast<int>(std::lround(part * own));
-    if (wished < kFewest) continue;
-    const std::unique_ptr<Conversion> coarser = on_coarser_mesh(imported, wished_limit, wished, stages);
-    if (!coarser || coarser->creature_.mesh.node_count() == last) continue;
-    last = coarser->creature_.mesh.node_count();
-    if (last >= own) return;
-    if (take_mesh(*coarser, wished, chosen_->setting, chosen_->harmonics)) return;
-    // The error that a cheap method and few harmonics use up may be what this mesh needs.
-    const retarget::StepSetting accurate{physics::Method::kExplicit, kControlSeconds};
-    const bool is_other = chosen_->setting.method != accurate.method || chosen_->harmonics > 0;
-    if (options_.method == "auto" && is_other && take_mesh(*coarser, wished, accurate, 0)) return;
-  }
-}
-
-bool Conversion::take_mesh(Conversion& coarser, int wished, const retarget::StepSetting& setting, int harmonics) {
-  ChosenStep chosen = *chosen_;
-  chosen.setting = setting;
-  chosen.harmonics = harmonics;
-  chosen.wished_nodes = wished;
-  coarser.chosen_ = chosen;
-  coarser.cut_signals();
-  const bool is_cheaper = take_coarser(chosen, target_.performer, coarser.target_.performer, coarser.signals_);
-  chosen_->curve.rows.push_back(chosen.curve.rows.back());
-  if (!is_cheaper) return false;
-  coarser.key_ = coarser.solved_key_;
-  coarser.perform();
-  if (is_down(coarser.performances_.main()) || strays(*chosen_, coarser.performances_.main())) return false;
-  chosen_ = std::move(chosen);
-  take_over(coarser);
-  return true;
-}
-
-std::unique_ptr<Conversion> Conversion::on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished,
-                                                        Stages& stages) {
-  retarget::CreatureOptions settings = settings_;
-  settings.nodes = wished;
-  auto coarser = std::make_unique<Conversion>(options_, settings, stages, writer_);
-  try {
-    coarser->add_warnings(imported.warnings);
-    coarser->solve(imported, wished_limit);
-  } catch (const Error&) {
-    return nullptr;
-  }
-  coarser->chosen_ = chosen_;
-  coarser->whole_signals_ = coarser->signals_;
-  coarser->cut_signals();
-  return coarser;
-}
-
-void Conversion::take_over(Conversion& coarser) {
-  settings_ = coarser.settings_;
-  key_ = coarser.key_;
-  solved_key_ = coarser.solved_key_;
-  creature_ = std::move(coarser.creature_);
-  motion_ = std::move(coarser.motion_);
-  inverse_ = std::move(coarser.inverse_);
-  target_ = std::move(coarser.target_);
-  signals_ = std::move(coarser.signals_);
-  whole_signals_ = std::move(coarser.whole_signals_);
-  performances_ = std::move(coarser.performances_);
-  target_file_ = std::move(coarser.target_file_);
-  signals_text_ = std::move(coarser.signals_text_);
-  is_performed_ = true;
 }
 
 void Conversion::tell_signals() {

@@ -278,7 +278,7 @@ void Run::control() {
   look_at_contacts();
   if (uneven_) {
     uneven_->look(time_s_, control_s_, fit_, seen);
-    uneven_->lead(contact_.in_air, contact_.lead);
+    uneven_->lead(contact_.in_air, seen, glided_, options_.corrector.foot_settle_s, contact_.lead);
     uneven_->apply(physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
   }
   input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);

@@ -177,11 +177,47 @@ void UnevenGround::apply(const Eigen::Vector3d& com, physics::State& reference) 
   }
 }
 
-void UnevenGround::lead(const std::vector<const Patch*>& feet, std::vector<Eigen::Vector3d>& moves) const {
+/// How much higher [m] it has to be before it goes on a little, so that it meets no riser; 0 where it meets none.
+double UnevenGround::missing_height(const Patch& patch, const Eigen::Vector3d& way, const physics::State& state) const {
+  const double ground = scene_.has_ground ? scene_.ground.offset : 0;
+  double missing = 0;
+  for (const int p : patch.points) {
+    const Eigen::Vector3d place = scene_.contact_points.of(state.x, p);
+    for (int step = 1; step <= kFromEdge; ++step) {
+      missing = std::max(missing, height_at(place + step * kFoothold * length_ * way, state) - (place.y() - ground));
+    }
+  }
+  return missing > kTouched * length_ ? missing : 0;
+}
+
+/// What keeps a foot that would meet a riser from going on, and lifts it over: its own place, a little back and as much higher as it has to be, in
+/// the place of the reference's, and the reference's speed undone.
+Eigen::Vector3d UnevenGround::hold(const Foot& foot, const physics::State& state, const physics::State& reference, double settle_s) const {
+  Eigen::Vector3d speed = Eigen::Vector3d::Zero(), off = Eigen::Vector3d::Zero();
+  for (const int p : foot.patch->points) {
+    const double share = 1 / static_cast<double>(foot.patch->points.size());
+    speed += share * scene_.contact_points.of(reference.v, p);
+    off += share * (scene_.contact_points.of(state.x, p) - scene_.contact_points.of(reference.x, p));
+  }
+  speed.y() = 0;
+  const Eigen::Vector3d way = speed.normalized();
+  const double missing = missing_height(*foot.patch, way, state);
+  if (missing == 0) return Eigen::Vector3d::Zero();
+  const double back = std::min(0.0, way.dot(off) - speed.norm() * settle_s - kFoothold * length_);
+  return back * way + (off.y() + missing + clearance_ * length_) * Eigen::Vector3d::UnitY();
+}
+
+void UnevenGround::lead(const std::vector<const Patch*>& feet, const physics::State& state, const physics::State& reference, double settle_s,
+                        std::vector<Eigen::Vector3d>& moves) const {
   moves.clear();
   for (const Patch* patch : feet) {
+    moves.push_back(Eigen::Vector3d::Zero());
     const auto foot = std::find_if(feet_.begin(), feet_.end(), [&](const Foot& f) { return f.patch == patch; });
-    moves.push_back(foot == feet_.end() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(foot->aside + (foot->lift - plane_at(foot->place)) * Eigen::Vector3d::UnitY()));
+    if (foot == feet_.end()) continue;
+    moves.back() = hold(*foot, state, reference, settle_s);
+    const double lift = foot->lift - plane_at(foot->place);
+    if (moves.back().isZero(0)) moves.back() = foot->aside;
+    moves.back().y() = std::max(moves.back().y(), lift);
   }
 }
 

@@ -21,8 +21,10 @@ class UnevenGround {
   void look(double time_s, double seconds, const RigidFit& fit, const physics::State& state);
   /// Raises and tilts a reference whose centre of mass is `com`.
   void apply(const Eigen::Vector3d& com, physics::State& reference) const;
-  /// By how much feet are to be moved from that reference [m]: lifted, and drawn aside from an edge.
-  void lead(const std::vector<const Patch*>& feet, std::vector<Eigen::Vector3d>& moves) const;
+  /// By how much feet are to be moved from that reference [m]: lifted, drawn aside from an edge, and held before a riser until they are
+  /// over it. Errors of place are to be made up for within `settle_s`.
+  void lead(const std::vector<const Patch*>& feet, const physics::State& state, const physics::State& reference, double settle_s,
+            std::vector<Eigen::Vector3d>& moves) const;
   /// Height [m] of the top at a place over the level ground.
   double height_at(const Eigen::Vector3d& place, const physics::State& state) const;
 
@@ -40,6 +42,8 @@ class UnevenGround {
   double highest(const Foot& foot, double time_s, const RigidFit& fit, const physics::State& state) const;
   double choose_foothold(Foot& foot, double time_s, const RigidFit& fit, const physics::State& state);
   void look_ahead(Foot& foot, double time_s, double seconds, const RigidFit& fit, const physics::State& state);
+  double missing_height(const Patch& patch, const Eigen::Vector3d& way, const physics::State& state) const;
+  Eigen::Vector3d hold(const Foot& foot, const physics::State& state, const physics::State& reference, double settle_s) const;
   double plane_at(const Eigen::Vector3d& place) const;
 
   const physics::Scene& scene_;

@@ -11,6 +11,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kLength = BoxCreature::kLength, kStep = 0.03 * kLength, kClearance = 0.03, kStride = 0.3;  // [m] but for the clearance
+constexpr double kSpeed = 1.8, kSettle = 0.1;  // [m/s], [s]
 constexpr Eigen::Index kFrames = 20, kLanding = 10;
 constexpr std::size_t kFoot = 2;  // of the patches: front right, whose sole lies at x = 0.4 to 0.5 m at first
 
@@ -44,9 +45,10 @@ struct Walk {
   Eigen::Vector3d led() const {
     UnevenGround ground(creature.scene, plan, kLength, kClearance);
     ground.look(0, 1.0 / 120, fit, state);
-    std::vector<Eigen::Vector3d> moves;
-    ground.lead({&plan.contacts.patches[kFoot]}, moves);
     physics::State reference = state;
+    reference.v.row(0).setConstant(kSpeed);
+    std::vector<Eigen::Vector3d> moves;
+    ground.lead({&plan.contacts.patches[kFoot]}, state, reference, kSettle, moves);
     ground.apply(physics::centre_of_mass(creature.scene.body, state.x), reference);
     Eigen::Vector3d raised = Eigen::Vector3d::Zero();  // what the reference is raised by, there
     for (const int p : plan.contacts.patches[kFoot].points) {
@@ -88,6 +90,21 @@ TEST(UnevenGround, AFootIsLiftedOverWhatLiesAheadByTheClearanceAndNotOverWhatLie
     walk.put_step(edge + 0.5);
     EXPECT_NEAR(walk.led().y(), 0, 1e-12);
   }
+}
+
+TEST(UnevenGround, AFootBeforeARiserGoesUpBeforeItGoesOn) {
+  Walk walk;
+  for (const double gap : {0.001, 0.004, 0.009}) {  // [m] between toe and riser; a foot minds what is within 2 % of L
+    SCOPED_TRACE("gap " + std::to_string(gap));
+    walk.put_step(0.5 + gap);
+    EXPECT_LT(walk.led().x() + kSpeed * kSettle, 0);  // not on, and a little back
+    EXPECT_GE(walk.led().y(), kStep + kClearance * kLength - 1e-6);
+    walk.state.x.row(1).array() += kStep + 0.001;  // over it: on
+    EXPECT_GE(walk.led().x(), -1e-12);
+    walk.state.x.row(1).array() -= kStep + 0.001;
+  }
+  walk.put_step(0.5 + 0.03 * kLength);
+  EXPECT_GE(walk.led().x(), -0.08 * kLength);
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ constexpr double kFinest = 4;                   // the reference's
 constexpr double kFinerMesh = 1.7;    // what is left of a mesh's error over its change from half the nodes, of second order
 constexpr double kUsualError = 0.01;  // per L
 constexpr double kLevels[] = {0.25, 0.5, 1, 2, 4};     // of a creature's nodes
+constexpr double kOtherLevels[] = {0.5, 1};            // where it is made of other elements than its own
 constexpr int kFewestNodes = 20;                       // of a level
 constexpr double kBriefly = 4;                         // [s] for which a level has to stay up
 constexpr double kHarmonics[] = {1, 0.75, 0.5, 0.25};  // of a creature's
@@ -184,37 +185,62 @@ class Bench {
     if (!command_.own_mesh && has_rig) of_levels(creature, reference);
   }
 
-  /// The creature by its own method and step on coarser and finer meshes, and on its own; one whose closed loop falls where
-  /// the creature's does not is told so.
+  /// The creature by its own method and step on coarser and finer meshes, on its own, and on some of other elements.
   void of_levels(const io::LoadedCreature& creature, const retarget::ReferenceOf<3>& reference) {
     const retarget::Rig rig = io::load_rig(command_.subject, creature);
     const retarget::Performer& solved = creature.target.performer;
-    retarget::ReplayOptions replay;
-    replay.method =
-        physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
-    take_steps(replay, {replay.method, io::setting(creature.record, "step_s", replay.step_s)});
+    const retarget::CreatureOptions own = io::level_options(creature);
     for (const double part : kLevels) {
-      const int wished = static_cast<int>(std::lround(part * solved.mesh.node_count()));
-      if (wished < kFewestNodes) continue;
-      progress_.begin("level of " + std::to_string(wished) + " nodes");
-      retarget::CreatureOptions options = io::level_options(creature);
-      options.nodes = wished;
-      const retarget::Level level =
-          part == 1 ? retarget::Level{solved, creature.signals} : retarget::at_level(solved, creature.signals, rig, options);
-      if (part != 1 && level.performer.mesh.node_count() == solved.mesh.node_count()) continue;  // its lattice is the creature's
-      retarget::AccuracyRow row =
-          retarget::measure_level(reference, level.performer, level.signals, {replay.method, replay.step_s});
-      row.harmonics = level.signals.activation.harmonics();
-      retarget::PerformOptions brief;
-      brief.baselines = false;
-      brief.replay = replay;
-      brief.replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);
-      brief.replay.duration_s = std::min(kBriefly, retarget::usual_duration(solved.prepared.target));
-      const retarget::Performances runs = retarget::perform_calmly(level.performer, level.signals, brief);
-      row.falls = runs.main().report.fell || runs.main().termination != physics::Termination::kDone;
-      row.stable = row.stable && !row.falls;
-      curve_.rows.push_back(row);
+      if (part == 1) {
+        add_level(creature, {solved, creature.signals}, reference);
+        continue;
+      }
+      const std::optional<retarget::Level> level = level_of(creature, rig, own, part);
+      // None that has the creature's own lattice.
+      if (level && level->performer.mesh.node_count() != solved.mesh.node_count()) add_level(creature, *level, reference);
     }
+    constexpr std::pair<bool, retarget::BodyMaterial> kKinds[] = {{false, retarget::BodyMaterial::kSprings},
+                                                                  {false, retarget::BodyMaterial::kStableNeoHookean},
+                                                                  {true, retarget::BodyMaterial::kStableNeoHookean}};
+    for (const auto& [hexahedra, material] : kKinds) {
+      const bool is_springs = material == retarget::BodyMaterial::kSprings;
+      if (hexahedra == own.hexahedra && is_springs == (own.material == retarget::BodyMaterial::kSprings)) continue;
+      retarget::CreatureOptions other = own;
+      other.hexahedra = hexahedra;
+      other.material = material;
+      other.calibrated = own.calibrated && !hexahedra && !is_springs;
+      for (const double part : kOtherLevels) {
+        if (const std::optional<retarget::Level> level = level_of(creature, rig, other, part)) add_level(creature, *level, reference);
+      }
+    }
+  }
+
+  /// None where it would have too few nodes.
+  std::optional<retarget::Level> level_of(const io::LoadedCreature& creature, const retarget::Rig& rig, retarget::CreatureOptions options,
+                                          double part) {
+    const retarget::Performer& solved = creature.target.performer;
+    options.nodes = static_cast<int>(std::lround(part * solved.mesh.node_count()));
+    if (options.nodes < kFewestNodes) return std::nullopt;
+    progress_.begin("level of " + std::to_string(options.nodes) + " nodes, " + (options.hexahedra ? "hex, " : "tet, ") +
+                    retarget::name_of(options.material));
+    return retarget::at_level(solved, creature.signals, rig, options);
+  }
+
+  /// One whose closed loop falls is told so.
+  void add_level(const io::LoadedCreature& creature, const retarget::Level& level, const retarget::ReferenceOf<3>& reference) {
+    retarget::PerformOptions brief;
+    retarget::ReplayOptions& replay = brief.replay;
+    replay.method = physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
+    take_steps(replay, {replay.method, io::setting(creature.record, "step_s", replay.step_s)});
+    retarget::AccuracyRow row = retarget::measure_level(reference, level.performer, level.signals, {replay.method, replay.step_s});
+    row.harmonics = level.signals.activation.harmonics();
+    brief.baselines = false;
+    replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);
+    replay.duration_s = std::min(kBriefly, retarget::usual_duration(level.performer.prepared.target));
+    const retarget::Performances runs = retarget::perform_calmly(level.performer, level.signals, brief);
+    row.falls = runs.main().report.fell || runs.main().termination != physics::Termination::kDone;
+    row.stable = row.stable && !row.falls;
+    curve_.rows.push_back(row);
   }
 
   template <int Dim>

@@ -7,7 +7,7 @@ namespace hydrostat::io {
 // Found by the archive, whose namespace this is.
 
 void name_fields(RecordArchive& archive, retarget::AccuracyRow& row) {
-  archive.fields("method", row.method, "element", row.element, "nodes", row.nodes, "dt", row.dt_s, "iterations", row.iterations,
+  archive.fields("method", row.method, "element", row.element, "material", row.material, "nodes", row.nodes, "dt", row.dt_s, "iterations", row.iterations,
                  "harmonics", row.harmonics, "error", row.error_rms_m, "error_length", row.error_rel_length, "ms_per_sim_s",
                  row.ms_per_sim_s, "work_ms", row.work_ms, "volume_error", row.volume_error, "momentum_error",
                  row.momentum_error, "angular_error", row.angular_error, "stable", row.stable, "falls", row.falls);

@@ -27,7 +27,7 @@ const char* colour_of(const std::string& method) {
 
 std::string name_of(const AccuracyRow& row) {
   std::string name =
-      row.method + ", " + std::to_string(row.nodes) + " nodes, " + row.element + ", step " + short_number(1000 * row.dt_s) + " ms";
+      row.method + ", " + std::to_string(row.nodes) + " nodes, " + row.element + " (" + row.material + "), step " + short_number(1000 * row.dt_s) + " ms";
   if (row.harmonics > 0) name += ", " + std::to_string(row.harmonics) + " harmonics";
   return name;
 }
@@ -81,7 +81,7 @@ std::string sentence(const AccuracyCurve& curve) {
 
 std::string table(const AccuracyCurve& curve, const std::vector<bool>& front) {
   std::string html =
-      "<table><tr><th>method<th>element<th>nodes<th>step [ms]<th>iterations a step<th>harmonics<th>error [m]<th>error [% "
+      "<table><tr><th>method<th>element<th>material<th>nodes<th>step [ms]<th>iterations a step<th>harmonics<th>error [m]<th>error [% "
       "L]<th>ms a "
       "second<th>counted [ms]<th>volume's error [%]<th>momentum unexplained [m g]<th>angular [m g "
       "L]<th>stable<th>front</tr>\n";
@@ -89,7 +89,7 @@ std::string table(const AccuracyCurve& curve, const std::vector<bool>& front) {
     const AccuracyRow& row = curve.rows[k];
     html += "<tr id=\"row" + std::to_string(k) + "\"" +
             (static_cast<int>(k) == curve.recommended ? " class=\"chosen\"" : "") + "><td>" + row.method + "<td>" +
-            row.element + "<td>" + std::to_string(row.nodes) + "<td>" + short_number(1000 * row.dt_s) + "<td>" +
+            row.element + "<td>" + row.material + "<td>" + std::to_string(row.nodes) + "<td>" + short_number(1000 * row.dt_s) + "<td>" +
             short_number(row.iterations) + "<td>" + (row.harmonics > 0 ? std::to_string(row.harmonics) : "-");
     for (const double value : {row.error_rms_m, 100 * row.error_rel_length, row.ms_per_sim_s, row.work_ms,
                                100 * row.volume_error, row.momentum_error, row.angular_error}) {
@@ -222,6 +222,7 @@ std::string accuracy_json(const AccuracyCurve& curve) {
     const AccuracyRow& row = curve.rows[k];
     json["rows"].push_back({{"method", row.method},
                             {"element", row.element},
+                            {"material", row.material},
                             {"nodes", row.nodes},
                             {"dt_s", row.dt_s},
                             {"iterations", row.iterations},

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "retarget/body_material.h"
 #include "retarget/step_cost.h"
 
 namespace hydrostat::retarget {
@@ -268,6 +269,7 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   AccuracyRow row;
   row.method = physics::name_of(setting.method);
   row.element = element_of(body);
+  row.material = name_of(body.elements.empty() ? BodyMaterial::kSprings : material_of(body.elements.front().block.law));
   row.nodes = body.node_count();
   row.dt_s = setting.dt_s;
   row.iterations = repeated.work.rounds / std::max(1.0, repeated.steps);

@@ -63,7 +63,7 @@ ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyO
 
 /// One point of the curve: what a setting costs and how far it is from the truth.
 struct AccuracyRow {
-  std::string method, element;
+  std::string method, element, material;
   int nodes = 0;
   double dt_s = 0;
   double iterations = 0;  // of the solver a step: substeps, Newton's, or those of L-BFGS

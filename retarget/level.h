@@ -19,8 +19,8 @@ struct Level {
   SignalSet signals;
 };
 
-/// The creature on a mesh of `options.nodes` wished nodes; of the options element, material and friction count too, and are
-/// the solved creature's.
+/// The creature on a mesh of `options.nodes` wished nodes; of the options element, material and friction count too: element and
+/// material need not be the solved creature's.
 ///
 /// The target's skin and the deformation inside are what the creature and its level have in common (carried_target); the level
 /// makes a plan of its own for them, and what was done to the solved signals lies on top (level_signals). Muscles are made

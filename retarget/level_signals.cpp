@@ -34,6 +34,9 @@ Eigen::MatrixXd activations_of(const physics::Body& body, const Eigen::MatrixXd&
   return body.elements.empty() ? measures.cwiseMax(kLeastSquare).cwiseSqrt().eval() : measures.array().exp().matrix().eval();
 }
 
+/// How fast measures grow with a body's activations, where these are 1.
+double slope_of(const physics::Body& body) { return body.elements.empty() ? 2 : 1; }
+
 /// What the inverse dynamics ask of a body for its target.
 SignalSet own_plan(const Performer& performer, double limit, int harmonics) {
   const physics::Body& body = performer.scene.body;
@@ -68,7 +71,7 @@ Eigen::MatrixXd carried_changes(const Performer& solved, const SignalSet& signal
   const auto measures = [&](const SignalSet& set) {
     return measures_of(body, signal::synthesise_samples(set.activation, signals.samples()).transpose());
   };
-  const Eigen::MatrixXd changes = measures(signals) - measures(own);
+  const Eigen::MatrixXd changes = (slope_of(level.scene.body) / slope_of(body)) * (measures(signals) - measures(own));
   if (changes.cwiseAbs().maxCoeff() < kNoChange) return {};
   const Eigen::MatrixXd tensors = tensors_along(body.rest, body.edges, changes);
   return values_along(tensors, solved.mesh, rig.bone_weights, level.mesh, level.scene.body.edges);

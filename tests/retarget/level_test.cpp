@@ -225,6 +225,24 @@ TEST(AtLevel, FeelsWhatWasDoneToTheSolvedSignals) {
   }
 }
 
+// A level of finite elements reads logarithms where springs have squares: the same small strain is half of it there.
+TEST(AtLevel, OfElementsStandsWhereSpringsDoAndFeelsWhatWasDoneToThem) {
+  Solved solved = standing_block(40);
+  const physics::Body& body = solved.performer.scene.body;
+  const Eigen::RowVectorXd before = signal::synthesise_samples(solved.signals.activation, solved.signals.samples()).row(0);
+  const Level plain = at_level(solved.performer, solved.signals, solved.rig, options_for(40, true));
+  const physics::Scene& scene = plain.performer.scene;
+  ASSERT_FALSE(scene.body.elements.empty());
+  const Eigen::VectorXd bearing = played(plain);
+  EXPECT_LT(moved(scene, scene.body.rest, bearing), 0.2 * moved(scene, scene.body.rest, Eigen::VectorXd::Ones(bearing.size())));
+  constexpr double kStrain = 0.01;
+  Eigen::RowVectorXd edited = before;
+  for (int e = 0; e < body.edge_count(); ++e) edited[e] = std::sqrt(before[e] * before[e] + 2 * kStrain);
+  set_signals(edited, solved);
+  const Eigen::VectorXd after = played(at_level(solved.performer, solved.signals, solved.rig, options_for(40, true)));
+  EXPECT_LT(((after.array() / bearing.array()).log() - kStrain).abs().maxCoeff(), 0.02 * kStrain);
+}
+
 // A user who narrows the muscles' reach has them narrower on the levels, too; layers come along as they are.
 TEST(AtLevel, KeepsTheLimitAndTheLayersOfTheSolvedCreature) {
   Solved solved = standing_block(40);

@@ -84,10 +84,14 @@ std::vector<std::vector<bool>> steps_next(const ContactSchedule& contacts, doubl
   return steps;
 }
 
+bool has_flight(const PreparedTarget& plan) {
+  const std::vector<bool> flying = frames_in_flight(plan.contacts, plan.target.rate_hz, plan.target.loop);
+  return std::find(flying.begin(), flying.end(), true) != flying.end();
+}
+
 CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOptions& options) {
   CorrectorOptions result = options;
-  const std::vector<bool> flying = frames_in_flight(plan.contacts, plan.target.rate_hz, plan.target.loop);
-  if (std::find(flying.begin(), flying.end(), true) == flying.end()) return result;
+  if (!has_flight(plan)) return result;
   result.foot_weight *= kFeetOfLeaps;
   if (plan.target.loop) result.root_weight *= kMomentumOfHops;
   return result;

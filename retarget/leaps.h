@@ -20,6 +20,9 @@ void reach_out(const Motion& points, long frames, ContactSchedule& contacts, std
 /// is to fly first is no foot that could step under the body. All true where nothing flies.
 std::vector<std::vector<bool>> steps_next(const ContactSchedule& contacts, double rate_hz, bool loop);
 
+/// Whether anything of the plan flies.
+bool has_flight(const PreparedTarget& plan);
+
 /// Feedback for a plan that flies; any other's is as it was. A foot that a landing shakes loose is wanted back on its place rather than
 /// under the body, so that the rows of feet in the air weigh an eighth. A loop has the next hop to make up for an error of momentum,
 /// and the moment of its push is too short to do so at once: these rows weigh half. What is played once has to stand where it lands.

@@ -14,6 +14,7 @@
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
 #include "retarget/state_estimate.h"
+#include "retarget/strength_estimate.h"
 #include "retarget/stride_feedback.h"
 #include "retarget/uneven_ground.h"
 
@@ -67,6 +68,7 @@ class Run {
   void look_at_way(const physics::State& seen, double time_s);
   void control();
   void take_note(const physics::State& seen);
+  void command(double time_s);
   void activate(double share_of_step);
   physics::Termination advance();
   void write_trace(long row);
@@ -91,6 +93,7 @@ class Run {
   ReferenceGlide glide_;
   const std::vector<std::vector<bool>> steps_next_;
   std::optional<UnevenGround> uneven_;  // where there is more than the plan's ground
+  std::optional<StrengthEstimate> strength_;  // where the plan leaps again and again and the body is seen as it is
   StrideFeedback stride_;
   ReturnMap return_map_;
   long cycles_ = 0;  // of a loop, whose ends were seen
@@ -99,6 +102,7 @@ class Run {
   Eigen::VectorXd correction_;                  // of the muscles
   physics::State state_, reference_, glided_;
   physics::State path_then_;                    // when what is seen was
+  physics::State commanded_, before_;           // the path at the time of a command; before_: the last solver step of a control step
   RigidFit fit_;                                // from reference_ to state_
   Eigen::VectorXd activation_;                  // E, of a solver step
   Eigen::VectorXd mean_activation_;             // E, of a control step
@@ -151,6 +155,8 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
   if (!plant_.obstacles.empty()) uneven_.emplace(plant_, input.prepared, input.length, options.corrector.clearance);
   curve_.at(0, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
+  const bool is_seen = options.correct && options.observation.is_exact();
+  if (is_seen && target_.loop && has_flight(input.prepared)) strength_.emplace(input.model, control_s_);
   if (options.lesson) options.lesson->make_room(activation_.size(), state_.x.size(), steps_);
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);
@@ -281,9 +287,7 @@ void Run::control() {
     uneven_->lead(contact_.in_air, seen, glided_, options_.corrector.foot_settle_s, contact_.lead);
     uneven_->apply(physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
   }
-  input_.feed_forward(time_s_ + 0.5 * control_s_, activation_);
-  stride_.apply(time_s_ + 0.5 * control_s_, activation_);
-  return_map_.apply(time_s_ + 0.5 * control_s_, activation_);
+  command(time_s_ + 0.5 * control_s_);
   feedback_ = -activation_;
   corrector_.correct(seen, glided_, contact_, activation_);
   correction_ = corrector_.muscles_now();
@@ -291,12 +295,22 @@ void Run::control() {
   if (options_.lesson) take_note(seen);
 }
 
+/// The activations of a time, but for the corrector's.
+void Run::command(double time_s) {
+  input_.feed_forward(time_s, activation_);
+  if (strength_) {
+    curve_.at(time_s, commanded_.x, commanded_.v);
+    path_.apply(time_s, commanded_);
+    strength_->apply(commanded_.x, activation_);
+  }
+  stride_.apply(time_s, activation_);
+  return_map_.apply(time_s, activation_);
+}
+
 /// The activations at a time within the control step: signals that are held would come in jerks, which shake feet loose that hold
 /// by friction. Feedback comes at once, for what comes later balances worse.
 void Run::activate(double share_of_step) {
-  input_.feed_forward(time_s_ + share_of_step * control_s_, activation_);
-  stride_.apply(time_s_ + share_of_step * control_s_, activation_);
-  return_map_.apply(time_s_ + share_of_step * control_s_, activation_);
+  command(time_s_ + share_of_step * control_s_);
   activation_ += feedback_;
   activation_ = activation_.cwiseMax(1 - input_.limit).cwiseMin(1 + input_.limit);
 }
@@ -314,7 +328,10 @@ physics::Termination Run::advance() {
     if (moving_) move_obstacles(options_.moves, begin, options_.step_s, moving_->obstacles);
     activate((k + 0.5) / options_.steps_per_control);
     mean_activation_ += activation_ / options_.steps_per_control;
+    const bool looks = strength_ && k == options_.steps_per_control - 1;  // what feedback jerks has passed
+    if (looks) before_ = state_;
     termination = stepper_->step(options_.step_s, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
+    if (looks) strength_->look(options_.step_s, before_, state_, activation_, impulses_);
     physics::add(impulses_, step_impulses_);
     if (termination == physics::Termination::kDiverged) break;
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "retarget/leaps.h"
 #include "retarget/reference_glide.h"
 
 namespace hydrostat::retarget {
@@ -19,6 +20,7 @@ constexpr double kLeastOnLegs = 0.015;  // the same of what steps freely, for it
 constexpr double kThrown = 0.15;        // the same: what goes further astray falls or was pushed, and bends do not bring it back
 constexpr double kNews = 0.5;           // share of what a cycle did beyond what was foreseen that counts as drift
 constexpr double kSurprise = 0.05;  // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
+constexpr double kSurpriseOfLeap = 0.15;  // of a stride, where that is more: a leap's heading shows where it lands
 constexpr double kAstray = 0.3;     // per L, of a model's cycle
 
 /// An error of the way in lengths per L: a turn counts by how far it takes the ends of a body of length L.
@@ -62,6 +64,7 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
       yaw_(plan.target.yaw),
       least_drift_(is_dragged(plan.contacts) ? kLeastDrift : kLeastOnLegs),
       most_(kMost),
+      most_surprise_(kSurprise),
       is_loop_(plan.target.loop) {
   response_.setZero();
   if (!is_loop_) return;
@@ -69,6 +72,7 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
   const Eigen::Vector3d centre = plan.target.at(0).rowwise().mean(), stride = after_cycles(plan.target, 1) * centre - centre;
   const Eigen::Matrix3d back = turned(-yaw_);
   const Eigen::Vector3d aside = back * Eigen::Vector3d::UnitY().cross(stride);  // by a heading of 1 rad
+  if (has_flight(plan)) most_surprise_ = std::max(kSurprise, kSurpriseOfLeap * stride.norm() / length_);
   onward_ << 1, 0, 0, aside.x(), back(0, 0), back(0, 2), aside.z(), back(2, 0), back(2, 2);
 }
 
@@ -84,7 +88,7 @@ void ReturnMap::end_cycle(const WayError& error) {
   error_ = error;
   if (!has_learned_) {
     is_drifting_ = surprise > least_drift_ && surprise < kThrown;
-  } else if (surprise > kSurprise) {
+  } else if (surprise > most_surprise_) {
     handles_.setZero();
     most_ /= 2;
   } else {

@@ -55,6 +55,7 @@ class ReturnMap {
   double yaw_;          // [rad] of the target in a cycle
   double least_drift_;  // per L, a cycle
   double most_;         // of a handle
+  double most_surprise_;  // per L
   bool is_loop_, has_learned_ = false, is_drifting_ = false, was_tried_ = false;
   Eigen::MatrixXd bends_;   // E x 2
   Eigen::Matrix3d onward_;  // what one cycle makes of the error of the way by itself

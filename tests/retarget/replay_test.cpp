@@ -8,6 +8,7 @@
 
 #include "retarget/com_path.h"
 #include "retarget/inverse_dynamics.h"
+#include "retarget/performance.h"
 #include "tests/retarget/box_creature.h"
 
 namespace hydrostat::retarget {
@@ -180,6 +181,28 @@ TEST(Replay, ActivationsStayWithinTheLimit) {
   const Replay result = replay(actor.input(), options);
   EXPECT_LE(result.trace.activation.maxCoeff(), 1.3);
   EXPECT_GE(result.trace.activation.minCoeff(), 0.7);
+}
+
+TEST(Replay, WhatLeapsMakesUpForItsStrength) {
+  for (const bool leaps : {false, true}) {
+    for (const double stiffness : {0.85, 1.0, 1.2}) {
+      SCOPED_TRACE("leaps " + std::to_string(leaps) + ", stiffness " + std::to_string(stiffness));
+      Actor actor(standing(make_box_creature(), 20));
+      for (std::vector<ContactState>& states : actor.target.contacts.state) {
+        if (leaps) std::fill(states.begin() + 8, states.begin() + 13, ContactState::kOff);
+      }
+      const ReplayInput plan = actor.input();
+      const physics::Scene plant = varied_scene(plan.model, {1.1, 1, stiffness});
+      const ReplayInput input{plant,           plan.model,          plan.prepared,  plan.muscles, plan.feed_forward,
+                              plan.clip_skin, plan.skin_points, plan.clip_rise, plan.length,  plan.size, plan.limit};
+      ReplayOptions options = lasting(0.25);
+      options.corrector.effort = 1e9;  // the signals alone
+      const Eigen::VectorXd rest = Eigen::VectorXd::Ones(plant.body.edge_count());
+      const Eigen::VectorXd planned = actor.inverse.activation.col(0) - rest;
+      const Eigen::VectorXd commanded = replay(input, options).trace.activation.rightCols<1>() - rest;
+      EXPECT_LT((commanded - (leaps ? 1.1 / stiffness : 1) * planned).norm(), 0.01 * planned.norm());
+    }
+  }
 }
 
 TEST(Replay, TravelOfAClipThatStandsInPlaceIsNone) {

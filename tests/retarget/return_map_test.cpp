@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "tests/retarget/box_creature.h"
 
@@ -143,6 +145,29 @@ TEST(ReturnMap, RestsForACycleAfterWhatItDidNotForesee) {
   map.end_cycle(plant.error);
   EXPECT_FALSE(map.handles().isZero(0));
   EXPECT_LE(map.handles().cwiseAbs().maxCoeff(), 0.015 + 1e-12);
+}
+
+TEST(ReturnMap, WhatLeapsMayLandFartherFromWhereItWasForeseen) {
+  for (const bool leaps : {false, true}) {
+    SCOPED_TRACE("leaps " + std::to_string(leaps));
+    PreparedTarget plan = going(ContactState::kStick, 2 * kLength);
+    if (leaps) std::fill_n(plan.contacts.state[0].begin(), 10, ContactState::kOff);
+    plan.contacts.touching.setConstant(1, 60, true);
+    ReturnMap map(plan, kLength, make_box_creature().scene.body);
+    Plant plant = random_plant(3, 2 * kLength);
+    plant.go(map.handles(), true);
+    map.end_cycle(plant.error);
+    map.learn(plant.answers());
+    ASSERT_FALSE(map.handles().isZero(0));
+    plant.go(map.handles());
+    plant.error[1] += 0.2 * kLength;
+    map.end_cycle(plant.error);
+    EXPECT_EQ(map.handles().isZero(0), !leaps);
+    plant.go(map.handles());
+    plant.error[1] += 0.5 * kLength;
+    map.end_cycle(plant.error);
+    EXPECT_TRUE(map.handles().isZero(0));
+  }
 }
 
 TEST(ReturnMap, SeesTheErrorFromTheTargetsHeading) {

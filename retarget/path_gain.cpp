@@ -8,11 +8,11 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kLyingEffort = 20;  // times as much
+constexpr double kCrawlingEffort = 20;  // times as much
 
-/// It bears itself by its trunk alone.
-bool lies(const ContactSchedule& contacts) {
-  return !contacts.patches.empty() && std::none_of(contacts.patches.begin(), contacts.patches.end(), [](const Patch& patch) { return patch.on_leg; });
+/// It bears itself by its trunk alone, and that slides.
+bool crawls(const ContactSchedule& contacts) {
+  return is_dragged(contacts) && std::none_of(contacts.patches.begin(), contacts.patches.end(), [](const Patch& patch) { return patch.on_leg; });
 }
 
 /// How far momentum and spin of the path are from the target's, with the error of place that they are to make up for, in speeds per
@@ -39,7 +39,7 @@ double momentum_error(const ReplayInput& input, const MotionCurve& target, doubl
 
 CorrectorOptions gain_on_path(const ReplayInput& input, const CorrectorOptions& options) {
   CorrectorOptions result = options;
-  if (lies(input.prepared.contacts)) result.effort *= kLyingEffort;
+  if (crawls(input.prepared.contacts)) result.effort *= kCrawlingEffort;
   if (!input.path || input.path->is_empty() || input.scene.gravity.isZero(0)) return result;
   const MotionCurve target(input.prepared.target);
   const Eigen::Index samples = input.path->place.count();

@@ -5,9 +5,9 @@
 
 namespace hydrostat::retarget {
 
-/// The options by which a plan is corrected. What bears itself by its trunk alone lies on a broad base and does not fall of itself;
-/// it slips and sticks by turns, which the corrector's model foresees badly, and a gain that legs need rolls it until it tips
-/// over. So it is corrected at far more effort.
+/// The options by which a plan is corrected. What drags its trunk, and has no legs, lies on a broad base and does not fall of itself; it
+/// slips and sticks by turns, which the corrector's model foresees badly, and a gain that legs need rolls it until it tips over. So it is
+/// corrected at far more effort.
 ///
 /// Feedback is calm while the error is small. A path that was learned lies beside the target, and the loop was stable there at the
 /// gain that the distance to the target gave it: now that this distance is no error any more, that gain is kept.

@@ -61,7 +61,7 @@ run_scenes() {
 }
 run_creature() {
   make_creature boxdog_trot "$project/samples/boxdog_trot.fbx"
-  "$hydrostat" bench accuracy "$out/boxdog_trot" -o "$out/trot" --max-error 2% --own-mesh --duration 0.2 --quiet
+  "$hydrostat" bench accuracy "$out/boxdog_trot" -o "$out/trot" --max-error 2% --duration 0.2 --quiet
   cp -- "$out/trot/accuracy.svg" "$figures/accuracy_boxdog_trot.svg"
 }
 run_chosen() {

@@ -10,6 +10,7 @@
 #include "retarget/leaps.h"
 #include "retarget/obstacle_moves.h"
 #include "retarget/path_gain.h"
+#include "retarget/planned_contacts.h"
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
@@ -35,19 +36,6 @@ physics::State first_state(const Motion& target, const MotionCurve& curve, Nomin
   return state;
 }
 
-/// Before anything was simulated: what touches by plan sticks.
-ContactNow first_contact(const ContactSchedule& contacts) {
-  const Eigen::Index points = contacts.touching.rows();
-  ContactNow now;
-  now.touching.resize(static_cast<std::size_t>(points), ContactState::kOff);
-  now.bearing.resize(now.touching.size(), false);
-  now.force.setZero(3, points);
-  for (Eigen::Index p = 0; p < points; ++p) {
-    if (contacts.touching(p, 0)) now.touching[static_cast<std::size_t>(p)] = ContactState::kStick;
-  }
-  return now;
-}
-
 std::optional<physics::Scene> moving_plant(const ReplayInput& input, const ReplayOptions& options) {
   return options.moves.empty() ? std::nullopt : std::optional(input.scene);
 }
@@ -59,7 +47,6 @@ class Run {
   Replay play();
 
  private:
-  void look_at_contacts();
   void look_at_body();
   void keep_way();
   ReturnMap::Answers ask_model() const;
@@ -91,7 +78,7 @@ class Run {
   Observer observer_;
   StateEstimate estimate_;
   ReferenceGlide glide_;
-  const std::vector<std::vector<bool>> steps_next_;
+  const PlannedContacts planned_;
   std::optional<UnevenGround> uneven_;  // where there is more than the plan's ground
   std::optional<StrengthEstimate> strength_;  // where the plan leaps again and again and the body is seen as it is
   StrideFeedback stride_;
@@ -136,7 +123,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       observer_(options.observation, control_s_),
       estimate_(options.observation, control_s_, input.scene.gravity.norm()),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
-      steps_next_(steps_next(input.prepared.contacts, target_.rate_hz, target_.loop)),
+      planned_(input.prepared),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
@@ -144,7 +131,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       activation_(input.scene.body.edge_count()),
       mean_activation_(activation_.size()),
       feedback_(Eigen::VectorXd::Zero(activation_.size())),
-      contact_(first_contact(input.prepared.contacts)),
+      contact_(planned_.first()),
       impulses_(physics::make_impulses(input.scene)),
       step_impulses_(impulses_),
       effect_(3, input.scene.body.node_count()),
@@ -163,31 +150,6 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
   input.feed_forward(0, mean_activation_);
   physics::clear(step_impulses_);
   write_trace(0);
-}
-
-/// What the plan wants of the contacts from now until the corrector's horizon, and which feet are in the air.
-void Run::look_at_contacts() {
-  const ContactSchedule& plan = input_.prepared.contacts;
-  const auto now = static_cast<std::size_t>(frame_at(target_, time_s_));
-  const auto then = static_cast<std::size_t>(frame_at(target_, time_s_ + options_.corrector.horizon_s));
-  contact_.grip = 1;
-  contact_.in_air.clear();
-  std::fill(contact_.bearing.begin(), contact_.bearing.end(), false);
-  for (std::size_t k = 0; k < plan.patches.size(); ++k) {
-    const std::vector<ContactState>& planned = plan.state[k];
-    if (planned[now] == ContactState::kSlide) contact_.grip = 0;
-    const bool bears = planned[now] != ContactState::kOff && planned[then] != ContactState::kOff;
-    bool touches = false;
-    for (const int p : plan.patches[k].points) {
-      const auto point = static_cast<std::size_t>(p);
-      contact_.bearing[point] = bears;
-      touches = touches || contact_.touching[point] != ContactState::kOff;
-    }
-    const bool is_caught = uneven_ && touches && planned[now] == ContactState::kOff;  // by an edge: it is to get over it
-    if (plan.patches[k].on_leg && (!touches || is_caught) && steps_next_[k][now]) contact_.in_air.push_back(&plan.patches[k]);
-  }
-  // In flight nothing holds the trunk against a leg that swings.
-  if (contact_.in_air.size() == plan.patches.size()) contact_.in_air.clear();
 }
 
 /// Once a cycle, by what is seen of the body. What steers by its stretching needs no other way.
@@ -281,7 +243,7 @@ void Run::control() {
   glide_.apply(fit_.mean_a, glided_);
   stride_.follow(fit_, control_s_);
   keep_way();
-  look_at_contacts();
+  planned_.look(time_s_, options_.corrector.horizon_s, uneven_.has_value(), contact_);
   if (uneven_) {
     uneven_->look(time_s_, control_s_, fit_, seen);
     uneven_->lead(contact_.in_air, seen, glided_, options_.corrector.foot_settle_s, contact_.lead);

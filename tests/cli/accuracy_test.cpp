@@ -10,7 +10,7 @@
 #include "tests/cli/run_program.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::cli {
+namespace hydrostat::cli::accuracy_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -153,4 +153,4 @@ TEST_F(AccuracyCommands, AnEffectThatIsOffCostsNoInstruction) {
 }
 
 }  // namespace
-}  // namespace hydrostat::cli
+}  // namespace hydrostat::cli::accuracy_test

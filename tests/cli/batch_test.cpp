@@ -6,7 +6,7 @@
 #include "io/batch_results.h"
 #include "tests/cli/run_program.h"
 
-namespace hydrostat::cli {
+namespace hydrostat::cli::batch_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -155,4 +155,4 @@ TEST(Batch, FailsAJobWhoseLogCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace hydrostat::cli
+}  // namespace hydrostat::cli::batch_test

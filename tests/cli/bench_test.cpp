@@ -8,7 +8,7 @@
 #include "io/scaling_page.h"
 #include "tests/cli/run_program.h"
 
-namespace hydrostat::cli {
+namespace hydrostat::cli::bench_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -82,4 +82,4 @@ TEST(GrowthExponent, IsThePowerThatTimesFollow) {
 }
 
 }  // namespace
-}  // namespace hydrostat::cli
+}  // namespace hydrostat::cli::bench_test

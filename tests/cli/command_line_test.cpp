@@ -9,7 +9,7 @@
 
 #include "tests/cli/run_program.h"
 
-namespace hydrostat::cli {
+namespace hydrostat::cli::command_line_test {
 namespace {
 
 TEST(CommandLine, IsTheReadmesSubject) {
@@ -72,4 +72,4 @@ TEST(OneLine, HoldsFilePlaceFaultAndMend) {
 }
 
 }  // namespace
-}  // namespace hydrostat::cli
+}  // namespace hydrostat::cli::command_line_test

@@ -4,7 +4,7 @@
 
 #include "tests/cli/run_program.h"
 
-namespace hydrostat::cli {
+namespace hydrostat::cli::compare_test {
 namespace {
 
 /// A disc in the plane, simulated by three methods for 1.5 s.
@@ -82,4 +82,4 @@ TEST_F(Compare, NamesRunsByWhatTellsThemApart) {
 }
 
 }  // namespace
-}  // namespace hydrostat::cli
+}  // namespace hydrostat::cli::compare_test

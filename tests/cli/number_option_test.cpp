@@ -4,7 +4,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::cli {
+namespace hydrostat::cli::number_option_test {
 namespace {
 
 TEST(NumberOption, TakesFiniteNumbersWithinItsRangeAlone) {
@@ -18,4 +18,4 @@ TEST(NumberOption, TakesFiniteNumbersWithinItsRangeAlone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::cli
+}  // namespace hydrostat::cli::number_option_test

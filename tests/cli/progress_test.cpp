@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-namespace hydrostat::cli {
+namespace hydrostat::cli::progress_test {
 namespace {
 
 std::string shown(ProgressStyle style) {
@@ -48,4 +48,4 @@ TEST(Progress, LeavesTheLineOfAStageThatAnExceptionEnds) {
 }
 
 }  // namespace
-}  // namespace hydrostat::cli
+}  // namespace hydrostat::cli::progress_test

@@ -12,7 +12,7 @@
 #include "io/signals_file.h"
 #include "tests/signal/random_samples.h"
 
-namespace hydrostat {
+namespace hydrostat::signals_test {
 namespace {
 
 struct Outcome {
@@ -173,4 +173,4 @@ TEST_F(SignalsCommand, RefusesADamagedFile) {
 }
 
 }  // namespace
-}  // namespace hydrostat
+}  // namespace hydrostat::signals_test

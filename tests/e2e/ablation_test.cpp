@@ -9,7 +9,7 @@
 #include "retarget/inverse_dynamics.h"
 #include "retarget/limbs.h"
 
-namespace hydrostat {
+namespace hydrostat::ablation_test {
 namespace {
 
 // Gates of a trot. Per L; per L a cycle; per L a stance; of the clip's; of the whole body.
@@ -101,4 +101,4 @@ TEST_F(Ablation, WithoutTheMomentumStepThePlanLacksAForceThatNothingGives) {
 }
 
 }  // namespace
-}  // namespace hydrostat
+}  // namespace hydrostat::ablation_test

@@ -8,7 +8,7 @@
 #include "tests/e2e/trace_audit.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat {
+namespace hydrostat::convert_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -469,4 +469,4 @@ TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {
 }
 
 }  // namespace
-}  // namespace hydrostat
+}  // namespace hydrostat::convert_test

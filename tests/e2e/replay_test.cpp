@@ -3,7 +3,7 @@
 #include "tests/e2e/made_creature.h"
 #include "tests/e2e/trace_audit.h"
 
-namespace hydrostat {
+namespace hydrostat::replay_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -281,4 +281,4 @@ TEST_F(Replay, RefusesWhatItCannotDoAndABodyThatIsNotItsOwn) {
 }
 
 }  // namespace
-}  // namespace hydrostat
+}  // namespace hydrostat::replay_test

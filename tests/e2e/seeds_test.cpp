@@ -6,7 +6,7 @@
 
 #include "tests/e2e/made_creature.h"
 
-namespace hydrostat {
+namespace hydrostat::seeds_test {
 namespace {
 
 using nlohmann::json;
@@ -46,4 +46,4 @@ TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
 }
 
 }  // namespace
-}  // namespace hydrostat
+}  // namespace hydrostat::seeds_test

@@ -6,7 +6,7 @@
 #include "tests/e2e/made_creature.h"
 #include "tests/e2e/trace_audit.h"
 
-namespace hydrostat {
+namespace hydrostat::simulate_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -190,4 +190,4 @@ TEST(Simulate, WritesNoCreatureThatCouldBeReplayed) {
 }
 
 }  // namespace
-}  // namespace hydrostat
+}  // namespace hydrostat::simulate_test

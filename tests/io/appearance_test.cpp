@@ -16,7 +16,7 @@
 #include "tests/io/temporary_directory.h"
 #include "tests/io/tiny_gltf_file.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::appearance_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -354,4 +354,4 @@ TEST(ThirdPartyAppearance, AnFbxTellsColoursOfItsPartsAndTheImageWithinIt) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::appearance_test

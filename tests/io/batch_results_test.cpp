@@ -6,7 +6,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::batch_results_test {
 namespace {
 
 std::vector<BatchResult> example() {
@@ -61,4 +61,4 @@ TEST(BatchResults, RefuseAFileThatIsNone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::batch_results_test

@@ -5,7 +5,7 @@
 #include "tests/io/refusal.h"
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::body_file_test {
 namespace {
 
 std::string text_of(const retarget::Performer& performer) {
@@ -88,4 +88,4 @@ TEST(BodyFile, RefusesATextThatIsCutShort) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::body_file_test

@@ -6,7 +6,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::clip_range_test {
 namespace {
 
 SceneClip clip_of(const std::string& name, std::vector<double> times, double duration_s) {
@@ -90,4 +90,4 @@ TEST(ChooseClip, RefusesWhatDoesNotMoveAndListsWhatDoes) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::clip_range_test

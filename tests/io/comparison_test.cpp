@@ -12,7 +12,7 @@
 #include "tests/io/temporary_directory.h"
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::comparison_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -205,4 +205,4 @@ TEST(Base64, GivesTheBytesBackAndRefusesWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::comparison_test

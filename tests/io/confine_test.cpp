@@ -17,7 +17,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::confine_test {
 namespace {
 
 const std::string kSamples = HYDROSTAT_SAMPLES;
@@ -143,4 +143,4 @@ TEST(ReadInWorker, IsRefusedPastItsMemory) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::confine_test

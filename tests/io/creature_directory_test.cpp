@@ -11,7 +11,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::creature_directory_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -192,4 +192,4 @@ TEST(CreatureWriter, NamesTheFinalPlaceOfAFileThatCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::creature_directory_test

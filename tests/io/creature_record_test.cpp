@@ -8,7 +8,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::creature_record_test {
 namespace {
 
 CreatureRecord example() {
@@ -93,4 +93,4 @@ TEST(CreatureRecord, RefusesADirectoryWithoutOne) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::creature_record_test

@@ -8,7 +8,7 @@
 #include "tests/io/temporary_directory.h"
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::creature_scene_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -157,4 +157,4 @@ TEST_F(CreatureScenes, RefuseWhatIsNotOfTheWorldOrCannotBe) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::creature_scene_test

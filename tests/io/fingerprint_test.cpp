@@ -8,7 +8,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::fingerprint_test {
 namespace {
 
 TEST(Fingerprint, AgreesWithTheStandardsOwnExample) {
@@ -66,4 +66,4 @@ TEST(Fingerprint, MayGrowAfterItWasAsked) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::fingerprint_test

@@ -12,7 +12,7 @@
 #include "io/read_scene.h"
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::gltf_out_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -424,4 +424,4 @@ TEST(WriteSkinnedGlb, RefusesAPlaceThatCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::gltf_out_test

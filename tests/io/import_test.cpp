@@ -23,7 +23,7 @@
 #include "tests/io/tiny_gltf_file.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::import_test {
 namespace {
 
 using Box = std::array<double, 6>;  // min x y z, max x y z
@@ -741,4 +741,4 @@ TEST_P(HostileFile, EndsInOneSentenceAndExitCodeOne) {
 INSTANTIATE_TEST_SUITE_P(ThirdParty, HostileFile, testing::ValuesIn(hostile_files()), test_name);
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::import_test

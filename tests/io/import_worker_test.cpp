@@ -8,7 +8,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::import_worker_test {
 namespace {
 
 const std::string kClip = std::string(HYDROSTAT_SAMPLES) + "/worm_crawl.glb";
@@ -59,4 +59,4 @@ TEST(ReadInWorker, AWorkerThatCannotBeStartedIsAnError) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::import_worker_test

@@ -9,7 +9,7 @@
 #include "tests/io/temporary_directory.h"
 #include "tests/io/tiny_gltf_file.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::morphs_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -228,4 +228,4 @@ TEST(Morphs, TheirFileComesBackToTheBitAndNothingElseDoes) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::morphs_test

@@ -9,7 +9,7 @@
 #include "io/write_file.h"
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::npy_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -67,4 +67,4 @@ TEST(Npy, RefusesWhatIsNoSuchFile) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::npy_test

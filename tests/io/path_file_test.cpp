@@ -6,7 +6,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::path_file_test {
 namespace {
 
 retarget::Motion offset(Eigen::Index nodes) {
@@ -74,4 +74,4 @@ TEST(PathFile, RefusesWhatIsDamagedOrAboutAnotherBody) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::path_file_test

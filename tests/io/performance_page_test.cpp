@@ -6,7 +6,7 @@
 #include "tests/io/temporary_directory.h"
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::performance_page_test {
 namespace {
 
 TEST(PerformancePage, ShowsEveryRunThatThereIs) {
@@ -31,4 +31,4 @@ TEST(PerformancePage, ShowsEveryRunThatThereIs) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::performance_page_test

@@ -14,7 +14,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::report_page_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -286,4 +286,4 @@ TEST(ReportPage, RefusesAPlaceThatCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::report_page_test

@@ -9,7 +9,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::report_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -142,4 +142,4 @@ TEST(WriteReport, APlaceThatCannotBeWrittenIsNamed) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::report_test

@@ -7,7 +7,7 @@
 #include "io/scene_pose.h"
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::rig_test {
 namespace {
 
 Eigen::Affine3d random_transform(std::mt19937& random) {
@@ -194,4 +194,4 @@ TEST(BuildRig, ASingularInverseBindMatrixIsRefused) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::rig_test

@@ -12,7 +12,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::scene_effects_test {
 namespace {
 
 using retarget::ScenarioOf;
@@ -205,4 +205,4 @@ TEST_F(SceneEffects, AloneAndTogetherAreMeasured) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::scene_effects_test

@@ -14,7 +14,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::scene_file_test {
 namespace {
 
 using retarget::ScenarioOf;
@@ -461,4 +461,4 @@ TEST_F(SceneFiles, FarFromTheOriginMoveAsNearIt) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::scene_file_test

@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace hydrostat::io {
+namespace hydrostat::io::scene_pose_test {
 namespace {
 
 Eigen::Affine3d random_transform(std::mt19937& random) {
@@ -87,4 +87,4 @@ TEST(SplitTurn, TheRotationIsProperAndTheProductIsBack) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::scene_pose_test

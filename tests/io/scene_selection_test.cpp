@@ -10,7 +10,7 @@
 #include "io/scene_axes.h"
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::scene_selection_test {
 namespace {
 
 SceneNode node(const std::string& name, int parent, bool is_joint) {
@@ -173,4 +173,4 @@ TEST(SettleAxes, WhatTheUserSaysIsTakenForAllAxes) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::scene_selection_test

@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-namespace hydrostat::io {
+namespace hydrostat::io::scene_wire_test {
 namespace {
 
 Scene small_scene() {
@@ -106,4 +106,4 @@ TEST(SceneWire, IndicesThatPointNowhereAreRefused) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::scene_wire_test

@@ -10,7 +10,7 @@
 #include "retarget/error.h"
 #include "tests/signal/random_samples.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::signals_file_test {
 namespace {
 
 using retarget::SignalSet;
@@ -208,4 +208,4 @@ TEST(SignalsPlot, DrawsALinePerChannelAndEscapesNames) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::signals_file_test

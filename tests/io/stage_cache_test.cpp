@@ -9,7 +9,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::stage_cache_test {
 namespace {
 
 Record random_record(unsigned seed) {
@@ -114,4 +114,4 @@ TEST(StageCache, TellsThatItCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::stage_cache_test

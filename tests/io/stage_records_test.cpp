@@ -5,7 +5,7 @@
 #include "retarget/error.h"
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::stage_records_test {
 namespace {
 
 TEST(StageRecords, GivePerformancesBackToTheBit) {
@@ -104,4 +104,4 @@ TEST(RigFile, ComesBackWholeOrNotAtAll) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::stage_records_test

@@ -6,7 +6,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::toml_reader_test {
 namespace {
 
 TEST(NearestWord, IsTheOneWithTheFewestChanges) {
@@ -82,4 +82,4 @@ TEST(TomlReader, RefusesWhatIsNoToml) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::toml_reader_test

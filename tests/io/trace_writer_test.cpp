@@ -6,7 +6,7 @@
 #include "io/write_file.h"
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::trace_writer_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -81,4 +81,4 @@ TEST(WriteTrace, ReplacesATraceAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::trace_writer_test

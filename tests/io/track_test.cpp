@@ -8,7 +8,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::track_test {
 namespace {
 
 Track random_track(unsigned seed, Eigen::Index rows, Interpolation interpolation) {
@@ -93,4 +93,4 @@ TEST(MakeSound, RefusesWhatIsNoMotion) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::track_test

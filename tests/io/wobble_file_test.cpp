@@ -4,7 +4,7 @@
 
 #include "retarget/error.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::wobble_file_test {
 namespace {
 
 /// A body of two nodes with three vertices, and two modes of it.
@@ -52,4 +52,4 @@ TEST(WobbleFile, RefusesWhatIsDamagedOrAboutAnotherBody) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::wobble_file_test

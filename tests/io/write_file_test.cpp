@@ -8,7 +8,7 @@
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
-namespace hydrostat::io {
+namespace hydrostat::io::write_file_test {
 namespace {
 
 /// Files of this process end at `bytes`, as on a disk that is full.
@@ -81,4 +81,4 @@ TEST(ReadFile, RefusesWhatIsMissingOrADirectory) {
 }
 
 }  // namespace
-}  // namespace hydrostat::io
+}  // namespace hydrostat::io::write_file_test

@@ -4,7 +4,7 @@
 
 #include "tests/physics/lattice_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::body_test {
 namespace {
 
 template <typename Dimension>
@@ -98,4 +98,4 @@ TYPED_TEST(WholeBody, HasTheAngularMomentumOfItsInertiaTimesItsRateOfTurning) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::body_test

@@ -6,7 +6,7 @@
 #include "tests/io/temporary_directory.h"
 #include "tests/physics/element_method_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::calculix_test {
 namespace {
 
 constexpr double kStiff = 5e7;  // [Pa]: the bar sags by a few millimetres, where its law is Hooke's
@@ -100,4 +100,4 @@ TEST(ElementStatics, FewHexahedraSagNearlyAsTheConvergedBarDoes) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::calculix_test

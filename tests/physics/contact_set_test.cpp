@@ -5,7 +5,7 @@
 #include "tests/physics/method_cases.h"
 #include "tests/physics/obstacle_shapes.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::contact_set_test {
 namespace {
 
 template <typename Dimension>
@@ -167,4 +167,4 @@ TYPED_TEST(ContactSets, ShareALoadAmongPointsWithTheSameForceAndMoment) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::contact_set_test

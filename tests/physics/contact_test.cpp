@@ -7,7 +7,7 @@
 #include "tests/physics/method_cases.h"
 #include "tests/physics/obstacle_shapes.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::contact_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;  // [s]
@@ -284,4 +284,4 @@ METHOD_TEST(Contact, LiftsABodyOutOfWhatItStartsInWithoutThrowingIt) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::contact_test

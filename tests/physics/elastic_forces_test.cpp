@@ -4,7 +4,7 @@
 
 #include "tests/physics/lattice_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::elastic_forces_test {
 namespace {
 
 constexpr unsigned kSeeds = trials(30);
@@ -209,4 +209,4 @@ TYPED_TEST(ElasticForces, AreFiniteForAFlatAndForACollapsedBody) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::elastic_forces_test

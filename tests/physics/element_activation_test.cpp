@@ -9,7 +9,7 @@
 #include "physics/element_hourglass.h"
 #include "tests/physics/element_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_activation_test {
 namespace {
 
 constexpr unsigned kSeeds = trials(15);
@@ -226,4 +226,4 @@ TEST(MakeActivationFit, CellsOfALatticeShareOneMap) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_activation_test

@@ -4,7 +4,7 @@
 
 #include "tests/physics/element_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_block_test {
 namespace {
 
 ElementMesh<3> unit_box(Cut cut = Cut::kBoxes) { return element_bar<3>({1, 1, 1}, {1, 1, 1}, cut); }
@@ -91,4 +91,4 @@ TEST(MemoryOf, GrowsWithTheElementsAlone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_block_test

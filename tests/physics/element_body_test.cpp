@@ -5,7 +5,7 @@
 #include "physics/internal_forces.h"
 #include "tests/physics/element_method_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_body_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;
@@ -129,4 +129,4 @@ TEST(ElementStatics, SettledTetsSagAsCalculixSays) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_body_test

@@ -5,7 +5,7 @@
 #include "physics/internal_forces.h"
 #include "tests/physics/element_method_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_calibration_test {
 namespace {
 
 using Cells = Eigen::Vector3i;
@@ -87,4 +87,4 @@ TEST(UnlockingFactor, GrowsTowardsOneWithTheCellsAcross) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_calibration_test

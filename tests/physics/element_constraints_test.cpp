@@ -6,7 +6,7 @@
 
 #include "tests/physics/element_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_constraints_test {
 namespace {
 
 constexpr unsigned kSeeds = trials(20);
@@ -125,4 +125,4 @@ TEST(AddSpringForces, AreFiniteForACollapsedBody) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_constraints_test

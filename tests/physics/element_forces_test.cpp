@@ -4,7 +4,7 @@
 
 #include "tests/physics/element_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_forces_test {
 namespace {
 
 constexpr unsigned kSeeds = trials(20);
@@ -162,4 +162,4 @@ TEST(AddElementForces, FlatTetMeshMovesLikeItsTriangles) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_forces_test

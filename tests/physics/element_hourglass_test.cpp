@@ -6,7 +6,7 @@
 
 #include "tests/physics/element_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_hourglass_test {
 namespace {
 
 constexpr unsigned kSeeds = trials(50);
@@ -122,4 +122,4 @@ TYPED_TEST(Boxes, FoldedOnesAreSeen) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_hourglass_test

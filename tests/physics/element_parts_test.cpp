@@ -8,7 +8,7 @@
 #include "physics/internal_forces.h"
 #include "tests/physics/element_method_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_parts_test {
 namespace {
 
 TEST(WorkerTeam, DoesEveryPartOfEveryRoundOnce) {
@@ -72,4 +72,4 @@ TEST(ElementParts, GiveTheSameBytesForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_parts_test

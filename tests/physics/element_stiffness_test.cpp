@@ -7,7 +7,7 @@
 #include "physics/element_hourglass.h"
 #include "tests/physics/element_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::element_stiffness_test {
 namespace {
 
 constexpr unsigned kSeeds = trials(12);
@@ -129,4 +129,4 @@ TYPED_TEST(Stiffness, LeastJacobiansAreOfTheMostSqueezedCorner) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::element_stiffness_test

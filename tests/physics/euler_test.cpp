@@ -5,7 +5,7 @@
 #include "physics/internal_forces.h"
 #include "tests/physics/element_method_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::euler_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;
@@ -150,4 +150,4 @@ TYPED_TEST(Euler, SinksIntoTheGroundByNoMoreThanItsShareOfTheSize) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::euler_test

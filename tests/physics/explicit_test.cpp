@@ -5,7 +5,7 @@
 #include "physics/system_matrix.h"
 #include "tests/physics/lattice_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::explicit_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;
@@ -112,4 +112,4 @@ TYPED_TEST(Explicit, TakesMostOfTheLinearStabilityBound) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::explicit_test

@@ -10,7 +10,7 @@
 #include "physics/stepper.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::fluid_test {
 namespace {
 
 /// A box of springs that nothing but a fluid and gravity acts on, in a shape drawn from a seed.
@@ -115,4 +115,4 @@ TEST(PlanEffects, HoldsWhatTheSceneHas) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::fluid_test

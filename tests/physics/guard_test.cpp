@@ -6,7 +6,7 @@
 #include "physics/internal_forces.h"
 #include "tests/physics/element_method_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::guard_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;
@@ -177,4 +177,4 @@ TEST(Guard, TriesAStepAgainInShorterOnesWhereToldTo) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::guard_test

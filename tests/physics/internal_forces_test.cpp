@@ -7,7 +7,7 @@
 
 #include "tests/physics/element_method_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::internal_forces_test {
 namespace {
 
 constexpr unsigned kSeeds = 3;
@@ -138,4 +138,4 @@ TYPED_TEST(Internal, AnActivationThatHasNoShapeIsRefusedAndTheNextOneTaken) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::internal_forces_test

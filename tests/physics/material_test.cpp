@@ -13,7 +13,7 @@
 #include "physics/material_rotation.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::material_test {
 namespace {
 
 constexpr unsigned kSeeds = trials(200);
@@ -243,4 +243,4 @@ TEST(NearestRotation, OfFourAtOnceIsThatOfEach) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::material_test

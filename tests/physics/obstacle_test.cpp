@@ -5,7 +5,7 @@
 #include "tests/physics/obstacle_shapes.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::obstacle_test {
 namespace {
 
 template <typename Dimension>
@@ -136,4 +136,4 @@ TYPED_TEST(Obstacles, HaveTheirCornersWhereTheyArePointed) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::obstacle_test

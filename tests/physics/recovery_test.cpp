@@ -6,7 +6,7 @@
 
 #include "tests/physics/lattice_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::recovery_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;
@@ -108,4 +108,4 @@ TYPED_TEST(Recovery, LeavesSoundStatesAndHeldBodiesToTheMethod) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::recovery_test

@@ -4,7 +4,7 @@
 
 #include "tests/physics/seam_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::seam_test {
 namespace {
 
 template <typename Dimension>
@@ -116,4 +116,4 @@ TYPED_TEST(Seams, KeepTheMassOfEveryNode) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::seam_test

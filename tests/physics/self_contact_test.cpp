@@ -5,7 +5,7 @@
 #include "physics/nearest_on_face.h"
 #include "tests/physics/method_cases.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::self_contact_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;  // [s]
@@ -270,4 +270,4 @@ TEST(SelfContactSets, FindNothingInABodyThatIsOnlyStrained) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::self_contact_test

@@ -5,7 +5,7 @@
 #include "tests/physics/lattice_scene.h"
 #include "tests/physics/obstacle_shapes.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::simplex_mesh_test {
 namespace {
 
 template <typename Dimension>
@@ -150,4 +150,4 @@ TEST(SimplexMesh, KeepsTheCornersOfAConcaveOutline) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::simplex_mesh_test

@@ -26,7 +26,7 @@ void* __wrap__Znwm(std::size_t size) {
 }
 }
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::stepper_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;  // [s]
@@ -436,4 +436,4 @@ METHOD_TEST(Steppers, NeverCallAStateThatIsNoNumberDone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::stepper_test

@@ -7,7 +7,7 @@
 #include "physics/elastic_forces.h"
 #include "tests/physics/lattice_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::system_matrix_test {
 namespace {
 
 template <int Dim>
@@ -151,4 +151,4 @@ TYPED_TEST(SystemMatrices, RefusesToFactorWhatIsNotPositiveDefiniteAndRecovers) 
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::system_matrix_test

@@ -4,7 +4,7 @@
 
 #include "tests/physics/seam_scene.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::tearing_test {
 namespace {
 
 template <typename Dimension>
@@ -148,4 +148,4 @@ TYPED_TEST(Tearings, FeelActivation) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::tearing_test

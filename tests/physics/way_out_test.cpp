@@ -5,7 +5,7 @@
 #include "tests/physics/deepest_place.h"
 #include "tests/physics/obstacle_shapes.h"
 
-namespace hydrostat::physics {
+namespace hydrostat::physics::way_out_test {
 namespace {
 
 template <typename Dimension>
@@ -108,4 +108,4 @@ TYPED_TEST(WaysOut, EndWhereAPlaceHasBeenOutside) {
 }
 
 }  // namespace
-}  // namespace hydrostat::physics
+}  // namespace hydrostat::physics::way_out_test

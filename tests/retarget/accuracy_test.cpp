@@ -10,7 +10,7 @@
 #include "retarget/step_cost.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::accuracy_test {
 namespace {
 
 using Scenario = ScenarioOf<2>;
@@ -196,4 +196,4 @@ TEST(ParetoFront, HoldsWhatNothingBeatsInBoth) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::accuracy_test

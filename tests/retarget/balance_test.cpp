@@ -8,7 +8,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::balance_test {
 namespace {
 
 TEST(ContactGenerators, StayInsideTheConeAndOpposeTheSliding) {
@@ -112,4 +112,4 @@ TEST(FindShift, AJerkThatCostsSpreadsALanding) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::balance_test

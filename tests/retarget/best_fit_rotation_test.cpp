@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::best_fit_rotation_test {
 namespace {
 
 struct Cloud {
@@ -98,4 +98,4 @@ TEST(BestFitRotations, StayOnOneHemisphereOverManyTurns) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::best_fit_rotation_test

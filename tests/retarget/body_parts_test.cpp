@@ -8,7 +8,7 @@
 #include "retarget/disjoint_sets.h"
 #include "shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::body_parts_test {
 namespace {
 
 BodyVoxels voxels_of(const SkinnedMesh& skin, const Eigen::Vector3i& cells) {
@@ -107,4 +107,4 @@ TEST(DropSlivers, LeavesOutALayerAsThinAsTheLeastFillAlone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::body_parts_test

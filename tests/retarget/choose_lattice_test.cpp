@@ -4,7 +4,7 @@
 
 #include "shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::choose_lattice_test {
 namespace {
 
 TEST(FittedLattice, SpansTheBoxExactly) {
@@ -53,4 +53,4 @@ TEST(Misfit, PrefersFullCubesOfTheWantedNumber) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::choose_lattice_test

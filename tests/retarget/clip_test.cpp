@@ -7,7 +7,7 @@
 
 #include "tests/physics/lattice_scene.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::clip_test {
 namespace {
 
 struct Rig {
@@ -71,4 +71,4 @@ TEST(SkinPositions, MoveByTheWeightOfTheBoneThatMoves) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::clip_test

@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::com_path_test {
 namespace {
 
 struct Case {
@@ -78,4 +78,4 @@ TEST(ApexRise, OfAMotionThatOnlySinksIsNone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::com_path_test

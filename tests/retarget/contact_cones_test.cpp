@@ -9,7 +9,7 @@
 #include "tests/retarget/box_creature.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::contact_cones_test {
 namespace {
 
 constexpr double kWeight = 30;
@@ -143,4 +143,4 @@ TEST(ContactCones, APointThatIsPressedDownGivesMore) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::contact_cones_test

@@ -4,7 +4,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::contact_loads_test {
 namespace {
 
 constexpr double kStep = 1.0 / 120;
@@ -71,4 +71,4 @@ TEST(PatchLoads, GapIsThatOfTheLowestPoint) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::contact_loads_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::contacts_test {
 namespace {
 
 constexpr double kLength = 1, kSize = 0.4;  // [m]: a patch touches below 12 mm
@@ -186,4 +186,4 @@ TEST(PointMotion, IsTheWeightedSumOfTheNodes) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::contacts_test

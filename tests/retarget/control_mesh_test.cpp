@@ -9,7 +9,7 @@
 #include "retarget/error.h"
 #include "shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::control_mesh_test {
 namespace {
 
 double tet_volume(const ControlMesh& mesh, Eigen::Index tet) {
@@ -225,4 +225,4 @@ TEST(BodyOptions, NameTheRuleTheyBreak) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::control_mesh_test

@@ -7,7 +7,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::corrector_test {
 namespace {
 
 constexpr double kLimit = 0.3;
@@ -263,4 +263,4 @@ TEST(Corrector, ForgetsWhenReset) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::corrector_test

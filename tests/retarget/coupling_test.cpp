@@ -9,7 +9,7 @@
 #include "retarget/morphs.h"
 #include "shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::coupling_test {
 namespace {
 
 struct Setting {
@@ -218,4 +218,4 @@ TEST(CouplingOptions, NameTheRuleTheyBreak) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::coupling_test

@@ -7,7 +7,7 @@
 
 #include "tests/retarget/shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::creature_test {
 namespace {
 
 /// A block of 1 x 0.4 x 0.5 m on one bone that goes along `travel` [m] in `frames` frames at 60 Hz, `lift` [m] above the ground.
@@ -110,4 +110,4 @@ TEST(ImportMotion, KeepsTheTravelOfNodesAndSkinTogether) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::creature_test

@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::cut_into_tets_test {
 namespace {
 
 /// A part in each cell of the grid, linked to all its neighbours.
@@ -89,4 +89,4 @@ TEST(CutIntoTets, TwoPartsOfACellAreCopiesInOnePlace) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::cut_into_tets_test

@@ -6,7 +6,7 @@
 
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::effects_test {
 namespace {
 
 std::map<std::string, EffectReport> effects(const ReplayOptions& options) {
@@ -41,4 +41,4 @@ TEST(EffectsOf, PushesAreOnWhereTheyAreAskedFor) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::effects_test

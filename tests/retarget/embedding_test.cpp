@@ -6,7 +6,7 @@
 #include "retarget/control_mesh.h"
 #include "shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::embedding_test {
 namespace {
 
 std::vector<Character> some_bodies() { return {worm(), two_legged(0.1), {one_bone(), ball_skin({0.2, 0.5, 0.3}), {}}}; }
@@ -91,4 +91,4 @@ TEST(ContactPoints, StartWithTheSoles) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::embedding_test

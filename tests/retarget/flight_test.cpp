@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::flight_test {
 namespace {
 
 constexpr double kGravity = 9.81;
@@ -104,4 +104,4 @@ TEST(FlightWarnings, AreOfTheWorst) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::flight_test

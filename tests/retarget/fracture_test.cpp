@@ -6,7 +6,7 @@
 #include "retarget/simulation.h"
 #include "tests/physics/seam_scene.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::fracture_test {
 namespace {
 
 using physics::FractureOf;
@@ -233,4 +233,4 @@ TYPED_TEST(Fractures, LetGoWhatHeldTheParts) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::fracture_test

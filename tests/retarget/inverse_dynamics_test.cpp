@@ -8,7 +8,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::inverse_dynamics_test {
 namespace {
 
 constexpr double kLength = BoxCreature::kLength;
@@ -249,4 +249,4 @@ TEST(AutomaticLimit, IsThe99thPercentileWithinItsBounds) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::inverse_dynamics_test

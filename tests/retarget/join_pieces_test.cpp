@@ -4,7 +4,7 @@
 
 #include "retarget/cut_into_tets.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::join_pieces_test {
 namespace {
 
 /// Parts in the given cells, not linked.
@@ -60,4 +60,4 @@ TEST(JoinPieces, DropsAPieceThatIsFartherAwayThanItIsLarge) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::join_pieces_test

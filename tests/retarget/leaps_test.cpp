@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::leaps_test {
 namespace {
 
 using enum ContactState;
@@ -136,4 +136,4 @@ TEST(GainOfLeaps, IsTheUsualOfWhatNeverFlies) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::leaps_test

@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::least_squares_test {
 namespace {
 
 /// A random problem whose last `free` columns are one unbounded block; bounds that many entries run into.
@@ -243,4 +243,4 @@ TEST(BoundedLeastSquares, NothingUnknownIsAProblemToo) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::least_squares_test

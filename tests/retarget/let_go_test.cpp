@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::let_go_test {
 namespace {
 
 using enum ContactState;
@@ -111,4 +111,4 @@ TEST(LetGo, TheSeamOfALoopIsAStepLikeOthers) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::let_go_test

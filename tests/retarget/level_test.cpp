@@ -18,7 +18,7 @@
 #include "tests/retarget/shapes.h"
 #include "tests/sanitizers.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::level_test {
 namespace {
 
 constexpr double kLimit = 0.3;
@@ -321,4 +321,4 @@ TEST(CountedWork, OfCorrectionsGrowsWithTheNodesAsTheirTimeDoes) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::level_test

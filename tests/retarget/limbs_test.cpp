@@ -4,7 +4,7 @@
 
 #include "shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::limbs_test {
 namespace {
 
 TEST(Limbs, ShinsAreOfDifferentLimbsThighsAreNot) {
@@ -57,4 +57,4 @@ TEST(Limbs, TheDominantBoneHasTheGreatestWeight) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::limbs_test

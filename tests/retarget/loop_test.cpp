@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::loop_test {
 namespace {
 
 constexpr Eigen::Index kPeriod = 30, kPoints = 8;
@@ -115,4 +115,4 @@ TEST(PlayedOnce, IsALeapFromRestToRest) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::loop_test

@@ -6,7 +6,7 @@
 #include <string>
 #include <tuple>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::motion_test {
 namespace {
 
 /// Smooth random courses of `points` points: of a loop two harmonics, carried along and turned.
@@ -185,4 +185,4 @@ TEST(MotionCurve, OfASingleFrameStands) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::motion_test

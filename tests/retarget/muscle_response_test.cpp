@@ -6,7 +6,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::muscle_response_test {
 namespace {
 
 constexpr double kHorizon = 1.0 / 30;
@@ -93,4 +93,4 @@ TEST(MuscleResponse, where_everything_lets_go_at_once_it_is_made_anew) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::muscle_response_test

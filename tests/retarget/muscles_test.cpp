@@ -8,7 +8,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::muscles_test {
 namespace {
 
 Muscles muscles_of(const BoxCreature& creature, int most_regions = 13) {
@@ -135,4 +135,4 @@ TEST(Muscles, OfTheLeftAreThoseOfTheRightInAMirror) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::muscles_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::observer_test {
 namespace {
 
 constexpr double kStep = 1.0 / 120;
@@ -51,4 +51,4 @@ TEST(Observer, NoiseHasItsSizeIsDrawnAnewAndGivesTheSpeedThatItLooksLike) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::observer_test

@@ -4,7 +4,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::path_gain_test {
 namespace {
 
 /// The gain for a box on its four soles.
@@ -32,4 +32,4 @@ TEST(PathGain, WhatDragsItsTrunkIsCorrectedAtMoreEffortThanLegsInProportionToWha
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::path_gain_test

@@ -4,7 +4,7 @@
 
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::performance_test {
 namespace {
 
 PerformOptions lasting(double seconds) {
@@ -129,4 +129,4 @@ TEST(SubstepError, IsSmallAndShrinksWithTheStep) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::performance_test

@@ -6,7 +6,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::planned_contacts_test {
 namespace {
 
 constexpr Eigen::Index kFrames = 30;  // at 60 Hz
@@ -68,4 +68,4 @@ TEST(PlannedContacts, InFlightNoFootIsSentAnywhere) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::planned_contacts_test

@@ -4,7 +4,7 @@
 
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::polish_test {
 namespace {
 
 PerformOptions lasting(double seconds) {
@@ -143,4 +143,4 @@ TEST(NominalPathCurve, TurnsWithTheLoop) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::polish_test

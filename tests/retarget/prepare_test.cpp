@@ -10,7 +10,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::prepare_test {
 namespace {
 
 double volume_error_rms(const physics::Body& body, const Motion& motion) {
@@ -247,4 +247,4 @@ TEST(Prepare, OfALoopThatTravelsTravelsOn) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::prepare_test

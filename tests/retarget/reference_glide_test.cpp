@@ -8,7 +8,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::reference_glide_test {
 namespace {
 
 /// The body stands at `offset` from the target and is turned by `yaw`.
@@ -102,4 +102,4 @@ TEST(YawOf, IsTheTurnAboutTheVertical) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::reference_glide_test

@@ -8,7 +8,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::replay_metrics_test {
 namespace {
 
 constexpr double kStep = 1.0 / 120;
@@ -181,4 +181,4 @@ TEST(ReplayMetrics, OfNoStepsAreNone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::replay_metrics_test

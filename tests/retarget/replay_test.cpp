@@ -11,7 +11,7 @@
 #include "retarget/performance.h"
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::replay_test {
 namespace {
 
 /// A box that knows how to carry `motion` on its four soles.
@@ -248,4 +248,4 @@ TEST(UsualDuration, IsFifteenCyclesOrTenSecondsAndASecondMoreForAOneShot) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::replay_test

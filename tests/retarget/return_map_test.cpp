@@ -10,7 +10,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::return_map_test {
 namespace {
 
 constexpr double kLength = BoxCreature::kLength, kPeriod = 2;
@@ -213,4 +213,4 @@ TEST(ReturnMap, BendsTheBodySidewaysAndNotWhereCyclesMeet) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::return_map_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::root_motion_test {
 namespace {
 
 constexpr Eigen::Index kFrames = 48;
@@ -182,4 +182,4 @@ TEST(RecoverRootMotion, NoneTakesTheTravelOfAOneShotAway) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::root_motion_test

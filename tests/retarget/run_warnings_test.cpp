@@ -4,7 +4,7 @@
 
 #include "tests/retarget/box_performer.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::run_warnings_test {
 namespace {
 
 TEST(TargetWarnings, SayNothingOfATargetThatLacksNothing) {
@@ -51,4 +51,4 @@ TEST(FeedbackWarnings, TellOfCalmerFeedbackAlone) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::run_warnings_test

@@ -4,7 +4,7 @@
 
 #include "tests/signal/random_samples.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::signal_set_test {
 namespace {
 
 using signal::Gain;
@@ -128,4 +128,4 @@ TEST(BrokenRule, NamesTheSignalOptionThatIsWrong) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::signal_set_test

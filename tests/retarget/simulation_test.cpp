@@ -7,7 +7,7 @@
 #include "physics/elastic_forces.h"
 #include "retarget/accuracy.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::simulation_test {
 namespace {
 
 using physics::VectorOf;
@@ -282,4 +282,4 @@ TYPED_TEST(Simulations, SpringsHaveTheStiffnessOfTheirMaterial) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::simulation_test

@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::skin_distance_test {
 namespace {
 
 constexpr int kNodes = 9, kVertices = 20;
@@ -92,4 +92,4 @@ TEST_P(SkinDistanceOf, OtherRatesAreMetBetweenTheirFrames) {
 INSTANTIATE_TEST_SUITE_P(Seeds, SkinDistanceOf, testing::Range(0u, 5u));
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::skin_distance_test

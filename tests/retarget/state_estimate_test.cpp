@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::state_estimate_test {
 namespace {
 
 constexpr double kStep = 1.0 / 120;
@@ -70,4 +70,4 @@ TEST(StateEstimate, LeavesLittleOfTheNoiseAndFollowsWhatLeavesThePath) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::state_estimate_test

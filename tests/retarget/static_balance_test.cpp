@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::static_balance_test {
 namespace {
 
 /// Nodes in a row along z, standing on four feet (points) around (0, 0), for some frames of a walk that turns.
@@ -86,4 +86,4 @@ TEST(BalanceStatically, HasNothingToSayOfWhatTouchesNothing) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::static_balance_test

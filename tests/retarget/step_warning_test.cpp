@@ -4,7 +4,7 @@
 
 #include "tests/physics/lattice_scene.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::step_warning_test {
 namespace {
 
 constexpr double kDt = 1.0 / 240;  // [s]
@@ -43,4 +43,4 @@ TEST(ExplicitStepWarning, NamesAnotherMethodWhereNoDampingTimeWould) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::step_warning_test

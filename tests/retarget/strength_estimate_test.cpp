@@ -10,7 +10,7 @@
 #include "retarget/performance.h"
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::strength_estimate_test {
 namespace {
 
 constexpr double kStep = 1.0 / 480, kLook = 1.0 / 120;
@@ -116,4 +116,4 @@ TEST(StrengthEstimate, SignalsPullAsHardForTheMassAsInThePlan) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::strength_estimate_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::stride_feedback_test {
 namespace {
 
 constexpr double kStride = 0.25, kPeriod = 2, kStep = 1.0 / 120;
@@ -97,4 +97,4 @@ TEST(StrideFeedback, DoesNotSteerWhatTravelsByOtherMeansThanStretching) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::stride_feedback_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::trace_test {
 namespace {
 
 /// Eight steps of a tenth of a second after the start; every time course counts its columns.
@@ -50,4 +50,4 @@ TEST(Shorten, CutsEveryCourseAlike) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::trace_test

@@ -7,7 +7,7 @@
 
 #include "tests/retarget/box_creature.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::uneven_ground_test {
 namespace {
 
 constexpr double kLength = BoxCreature::kLength, kStep = 0.03 * kLength, kClearance = 0.03, kStride = 0.3;  // [m] but for the clearance
@@ -108,4 +108,4 @@ TEST(UnevenGround, AFootBeforeARiserGoesUpBeforeItGoesOn) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::uneven_ground_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::vibration_test {
 namespace {
 
 /// Masses in a row between two walls, joined by springs.
@@ -53,4 +53,4 @@ TEST(LowestModes, AreNoneOfABodyThatNothingHolds) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::vibration_test

@@ -8,7 +8,7 @@
 
 #include "shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::voxelize_test {
 namespace {
 
 TEST(WithClosedHoles, LeavesAClosedSkinAlone) {
@@ -59,4 +59,4 @@ TEST(Voxelize, LetsNothingSlipThroughASlantedSkin) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::voxelize_test

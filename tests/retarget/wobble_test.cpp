@@ -8,7 +8,7 @@
 #include "retarget/wobble_plan.h"
 #include "tests/retarget/shapes.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::wobble_test {
 namespace {
 
 constexpr double kRate = 60;  // [Hz]
@@ -287,4 +287,4 @@ TEST(WornWith, PutsTheCreaturesOwnMorphTargetsFirst) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::wobble_test

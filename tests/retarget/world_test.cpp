@@ -6,7 +6,7 @@
 
 #include "retarget/obstacle_moves.h"
 
-namespace hydrostat::retarget {
+namespace hydrostat::retarget::world_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -77,4 +77,4 @@ TEST(World, TravelsOfObstaclesAreTheSumOfTheirSteps) {
 }
 
 }  // namespace
-}  // namespace hydrostat::retarget
+}  // namespace hydrostat::retarget::world_test

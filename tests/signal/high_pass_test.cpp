@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace hydrostat::signal {
+namespace hydrostat::signal::high_pass_test {
 namespace {
 
 constexpr double kCutoff = 10, kRate = 120;
@@ -38,4 +38,4 @@ TEST(HighPass, LetsNothingThroughThatStays) {
 }
 
 }  // namespace
-}  // namespace hydrostat::signal
+}  // namespace hydrostat::signal::high_pass_test

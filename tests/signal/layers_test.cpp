@@ -8,7 +8,7 @@
 
 #include "tests/signal/random_samples.h"
 
-namespace hydrostat::signal {
+namespace hydrostat::signal::layers_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -213,4 +213,4 @@ TEST(BrokenRule, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace hydrostat::signal
+}  // namespace hydrostat::signal::layers_test

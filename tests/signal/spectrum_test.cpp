@@ -7,7 +7,7 @@
 
 #include "tests/signal/random_samples.h"
 
-namespace hydrostat::signal {
+namespace hydrostat::signal::spectrum_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -164,4 +164,4 @@ TEST(SpreadClosureDefect, ClosesTheLoopAndTellsHowFarItWasOpen) {
 }
 
 }  // namespace
-}  // namespace hydrostat::signal
+}  // namespace hydrostat::signal::spectrum_test

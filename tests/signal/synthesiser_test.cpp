@@ -18,7 +18,7 @@ extern "C" void* malloc(std::size_t size) {
 }
 #endif
 
-namespace hydrostat::signal {
+namespace hydrostat::signal::synthesiser_test {
 namespace {
 
 TEST(Synthesiser, PlaysWhatTheSpectrumSays) {
@@ -73,4 +73,4 @@ TEST(ClipToLimits, HoldsAndCounts) {
 }
 
 }  // namespace
-}  // namespace hydrostat::signal
+}  // namespace hydrostat::signal::synthesiser_test

@@ -9,7 +9,7 @@
 
 #include "tests/signal/random_samples.h"
 
-namespace hydrostat::signal {
+namespace hydrostat::signal::transforms_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -59,4 +59,4 @@ TEST(RealFourierTransform, GivesTheSameBitsFromSeveralThreads) {
 }
 
 }  // namespace
-}  // namespace hydrostat::signal
+}  // namespace hydrostat::signal::transforms_test

@@ -9,7 +9,7 @@
 
 #include "tests/e2e/made_creature.h"
 
-namespace hydrostat {
+namespace hydrostat::convert_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -122,4 +122,4 @@ TEST(ThirdPartyClips, TheFrogThatCannotHopSaysWhatStopsIt) {
 }
 
 }  // namespace
-}  // namespace hydrostat
+}  // namespace hydrostat::convert_test

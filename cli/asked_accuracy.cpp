@@ -8,6 +8,7 @@
 #include "cli/command_line.h"
 #include "cli/number_option.h"
 #include "retarget/performed_scenario.h"
+#include "retarget/step_cost.h"
 
 namespace hydrostat::cli {
 namespace {
@@ -64,23 +65,68 @@ double closed_loop_error(const retarget::Replay& finest, const retarget::Perform
   return retarget::skin_distance(of_finest, finest.motion, performer, replay.motion);
 }
 
+/// What its closed loop came to is a row's error where it is the larger. Whether that refuses the row.
+bool refuses(double loop_m, double most_m, double length, retarget::AccuracyRow& row) {
+  row.falls = loop_m == HUGE_VAL;
+  if (row.falls) {
+    row.stable = false;
+  } else {
+    row.loop_error_m = loop_m;
+    row.error_rms_m = std::max(row.error_rms_m, loop_m);
+    row.error_rel_length = row.error_rms_m / length;
+  }
+  row.is_refused = row.falls || row.error_rms_m > most_m;
+  return row.is_refused;
+}
+
+/// Tells how many harmonics a creature's row has, and adds what playing them takes.
+void add_signals(retarget::AccuracyRow& row, const retarget::SignalSet& signals, int harmonics) {
+  row.harmonics = harmonics;
+  const double ms = retarget::counted_ms_of_signals(signals.activation.channels(), harmonics) / row.dt_s;
+  row.work_ms += ms;
+  row.ms_per_sim_s += ms;
+}
+
 /// The first of the candidates from the present one on whose closed loop stays near the finest one's, and up; the finest at
 /// the latest.
 void take_candidate(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals) {
   const double floor_m = chosen.reference->uncertainty_m();
   const double most_m = chosen.report.max_error_length * performer.length - floor_m;
-  const std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
+  std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
   for (;; ++chosen.candidate) {
     chosen.curve.recommended = chosen.candidates[chosen.candidate];
-    const retarget::AccuracyRow& row = rows[static_cast<std::size_t>(chosen.curve.recommended)];
+    retarget::AccuracyRow& row = rows[static_cast<std::size_t>(chosen.curve.recommended)];
     chosen.setting = {*physics::method_named(row.method), row.dt_s};
-    double error_m = row.error_rms_m;
     const bool is_last = chosen.candidate + 1 == chosen.candidates.size();
-    if (!is_last) error_m = std::max(error_m, closed_loop_error(*chosen.finest, performer, performer, signals, chosen.setting));
-    chosen.report.estimated_error_length = (error_m + floor_m) / performer.length;
+    const bool is_finest = is_last && chosen.setting.method == chosen.reference->setting.method;
+    const double loop_m = is_finest ? 0 : closed_loop_error(*chosen.finest, performer, performer, signals, chosen.setting);
+    const bool is_refused = refuses(loop_m, most_m, performer.length, row);
+    chosen.report.estimated_error_length = row.falls ? HUGE_VAL : (row.error_rms_m + floor_m) / performer.length;
     tell_saved(rows, chosen.curve.recommended, chosen.candidates.back(), chosen.report);
-    if (is_last || error_m <= most_m) return;
+    if (is_last || !is_refused) return;
   }
+}
+
+/// [m] that was asked for, of a grade at least what can be told.
+double most_told(const AskedAccuracy& asked, const std::string& command, double floor_m, double length) {
+  const double most = asked.most(command), floor = floor_m / length;
+  if (!asked.grade.empty()) return length * std::max(most, kOverFloor * floor);
+  if (most > floor) return length * most;
+  char text[200];
+  std::snprintf(text, sizeof text, "the reference itself is only known within %.2g %% of L, so that %.2g %% cannot be told",
+                100 * floor, 100 * most);
+  throw UsageError(command, "option --max-error", text, "Ask for a larger error.");
+}
+
+/// Which rows of a curve are of the whole run.
+template <int Dim>
+std::string whole_in_words(const retarget::ReferenceOf<Dim>& whole, double first_s) {
+  char text[240];
+  std::snprintf(text, sizeof text,
+                ", over %.3g s of the run for the chosen setting and what does less work within the error over the first %.3g s, over "
+                "these alone for the others",
+                whole.windows.front().duration_s, first_s);
+  return text;
 }
 
 }  // namespace
@@ -91,29 +137,31 @@ double AskedAccuracy::most(const std::string& command) const {
 
 template <int Dim>
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::ReferenceOf<Dim>& reference,
-                       std::optional<physics::Method> only) {
-  const double length = reference.scenario.length, floor = reference.uncertainty_m() / length;
-  double most = asked.most(command);
-  if (asked.grade.empty() && most <= floor) {
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "the reference itself is only known within %.2g %% of L, so that %.2g %% cannot be told", 100 * floor,
-                  100 * most);
-    throw UsageError(command, "option --max-error", text, "Ask for a larger error.");
-  }
-  if (!asked.grade.empty()) most = std::max(most, kOverFloor * floor);
-  const retarget::StepChoice choice = retarget::choose_setting(reference, most * length, only);
+                       std::optional<physics::Method> only, double duration_s) {
+  const double length = reference.scenario.length;
+  double floor_m = reference.uncertainty_m();
+  double most_m = most_told(asked, command, floor_m, length);
+  retarget::StepChoice choice = retarget::choose_setting(reference, most_m, only);
   ChosenStep chosen;
+  chosen.report.estimated_span_s = reference.windows.front().duration_s;
+  chosen.curve.truth = "Errors are distances to '" + physics::name_of(reference.setting.method) + "' in much shorter steps";
+  if (const auto whole = retarget::reference_of_whole(reference, duration_s)) {
+    floor_m = whole->uncertainty_m();
+    most_m = most_told(asked, command, floor_m, length);
+    choice = retarget::choose_for_whole(*whole, choice, most_m, only);
+    chosen.curve.truth += whole_in_words(*whole, chosen.report.estimated_span_s);
+    chosen.report.estimated_span_s = whole->windows.front().duration_s;
+  }
+  chosen.curve.truth += ".";
   chosen.setting = choice.setting;
-  chosen.report.max_error_length = most;
+  chosen.report.max_error_length = most_m / length;
   chosen.report.estimated_error_length = choice.estimated_error_m / length;
   chosen.curve.subject = "this body";
-  chosen.curve.truth = "Errors are distances to '" + physics::name_of(reference.setting.method) + "' in much shorter steps.";
   chosen.curve.rows = choice.tried;
-  chosen.curve.recommended =
-      choice.is_met ? retarget::cheapest_within(choice.tried, most * length - reference.uncertainty_m()) : -1;
-  chosen.curve.max_error = most;
-  chosen.curve.floor = floor;
+  chosen.curve.recommended = choice.is_met ? choice.index : -1;
+  chosen.curve.max_error = most_m / length;
+  chosen.curve.is_counted = true;
+  chosen.curve.floor = floor_m / length;
   tell_saved(choice.tried, chosen.curve.recommended, retarget::most_accurate(choice.tried), chosen.report);
   return chosen;
 }
@@ -125,11 +173,17 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   const bool is_rough = asked.most(command) >= kRough;
   const retarget::ReferenceOf<3> reference = retarget::performed_reference(performer, signals, options, !is_rough);
   ChosenStep chosen = choose_step(asked, command, reference, only);
-  if (!chosen.report.is_met()) return chosen;
-  const retarget::StepSetting finest{only.value_or(reference.setting.method), is_rough ? kRoughFinestSeconds : kFinestSeconds};
-  chosen.finest = closed_loop(performer, signals, finest);
   std::vector<retarget::AccuracyRow>& rows = chosen.curve.rows;
-  rows.push_back(retarget::measure_error(reference, reference.scenario, finest));
+  const int harmonics = signals.activation.harmonics();
+  for (retarget::AccuracyRow& row : rows) add_signals(row, signals, harmonics);
+  if (!chosen.report.is_met()) return chosen;
+  // Held against the method of the truth: shorter steps of another would not show what that one errs by.
+  const double finest_s = is_rough ? kRoughFinestSeconds : kFinestSeconds;
+  chosen.finest = closed_loop(performer, signals, {reference.setting.method, finest_s});
+  chosen.report.estimated_span_s = chosen.finest->report.duration_s;
+  rows.push_back(
+      retarget::measure_error(reference, reference.scenario, {only.value_or(reference.setting.method), finest_s}));
+  add_signals(rows.back(), signals, harmonics);
   const int last = static_cast<int>(rows.size()) - 1;
   for (const int k : by_work(rows, chosen.report.max_error_length * performer.length - reference.uncertainty_m())) {
     if (k == last) break;
@@ -150,6 +204,7 @@ bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const r
   if (chosen.candidate + 1 >= chosen.candidates.size()) return false;
   chosen.warnings.push_back("accuracy: by '" + physics::name_of(chosen.setting.method) +
                             "', which does less work within the error for some seconds, the creature fell or strayed in the end");
+  chosen.curve.rows[static_cast<std::size_t>(chosen.curve.recommended)].is_refused = true;
   ++chosen.candidate;
   chosen.harmonics = 0;
   take_candidate(chosen, performer, signals);
@@ -157,9 +212,9 @@ bool take_next(ChosenStep& chosen, const retarget::Performer& performer, const r
 }
 
 template ChosenStep choose_step<2>(const AskedAccuracy&, const std::string&, const retarget::ReferenceOf<2>&,
-                                   std::optional<physics::Method>);
+                                   std::optional<physics::Method>, double);
 template ChosenStep choose_step<3>(const AskedAccuracy&, const std::string&, const retarget::ReferenceOf<3>&,
-                                   std::optional<physics::Method>);
+                                   std::optional<physics::Method>, double);
 
 void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& setting) {
   options.method = setting.method;
@@ -170,24 +225,29 @@ void take_steps(retarget::ReplayOptions& options, const retarget::StepSetting& s
 void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, retarget::SignalSet& signals) {
   constexpr int kLeast = 4;
   const int all = signals.activation.harmonics();
-  for (retarget::AccuracyRow& row : chosen.curve.rows) row.harmonics = all;
   if (!chosen.report.is_met() || !chosen.finest || chosen.report.max_error_length >= kRough) return;
   const double room = (chosen.report.max_error_length - chosen.curve.floor) * performer.length;
+  const retarget::AccuracyRow whole = chosen.curve.rows[static_cast<std::size_t>(chosen.curve.recommended)];
+  const double playing_ms = retarget::counted_ms_of_signals(signals.activation.channels(), all) / whole.dt_s;
   int kept = all;
   for (const double part : {0.75, 0.5, 0.25}) {
     const int harmonics = std::max(kLeast, static_cast<int>(std::lround(part * all)));
     if (harmonics >= kept) break;
     retarget::AccuracyRow row = retarget::measure_error(
         *chosen.reference, retarget::performed_scenario(performer, signals, harmonics), chosen.setting);
-    row.harmonics = harmonics;
-    chosen.curve.rows.push_back(row);
-    if (!row.stable || row.error_rms_m > room) break;
+    // It runs the same steps as the whole signals' row: the clock would tell them apart by its noise alone.
+    if (whole.work_ms > playing_ms) row.ms_per_sim_s = (whole.ms_per_sim_s - playing_ms) * row.work_ms / (whole.work_ms - playing_ms);
+    add_signals(row, signals, harmonics);
+    const bool is_within = row.stable && row.error_rms_m <= room;
     const retarget::SignalSet fewer = retarget::with_harmonics(signals, harmonics);
-    const double error_m = std::max(row.error_rms_m, closed_loop_error(*chosen.finest, performer, performer, fewer, chosen.setting));
-    if (error_m > room) break;
+    const bool is_kept = is_within && !refuses(closed_loop_error(*chosen.finest, performer, performer, fewer, chosen.setting),
+                                               room, performer.length, row);
+    chosen.curve.rows.push_back(row);
+    if (!is_kept) break;
     chosen.harmonics = kept = harmonics;
     chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
-    chosen.report.estimated_error_length = error_m / performer.length + chosen.curve.floor;
+    chosen.report.estimated_error_length = row.error_rel_length + chosen.curve.floor;
+    tell_saved(chosen.curve.rows, chosen.curve.recommended, chosen.candidates.back(), chosen.report);
   }
   if (kept < all) signals = retarget::with_harmonics(signals, kept);
 }
@@ -195,15 +255,13 @@ void cut_harmonics(ChosenStep& chosen, const retarget::Performer& performer, ret
 bool take_coarser(ChosenStep& chosen, const retarget::Performer& solved, const retarget::Performer& coarser,
                   const retarget::SignalSet& signals) {
   retarget::AccuracyRow row = retarget::measure_level(*chosen.reference, coarser, signals, chosen.setting);
-  row.harmonics = signals.activation.harmonics();
-  const double loop_m = closed_loop_error(*chosen.finest, solved, coarser, signals, chosen.setting);
-  row.falls = loop_m == HUGE_VAL;
-  row.stable = row.stable && !row.falls;
+  add_signals(row, signals, signals.activation.harmonics());
+  const double room = (chosen.report.max_error_length - chosen.curve.floor) * solved.length;
+  refuses(closed_loop_error(*chosen.finest, solved, coarser, signals, chosen.setting), room, solved.length, row);
   chosen.curve.rows.push_back(row);
-  const double error_m = std::max(row.error_rms_m, loop_m);
-  const double error = error_m / solved.length + chosen.curve.floor;
+  const double error = row.error_rel_length + chosen.curve.floor;
   const retarget::AccuracyRow& present = chosen.curve.rows[static_cast<std::size_t>(chosen.curve.recommended)];
-  if (!row.stable || error > chosen.report.max_error_length || row.work_ms >= present.work_ms) return false;
+  if (!row.stable || row.is_refused || row.work_ms >= present.work_ms) return false;
   const int finest = chosen.candidates.back();
   chosen.curve.recommended = static_cast<int>(chosen.curve.rows.size()) - 1;
   chosen.report.estimated_error_length = error;
@@ -226,11 +284,11 @@ void write_curve(io::CreatureWriter& writer, const io::AccuracyCurve& curve) {
 std::string saved_words(const retarget::RunReport& run) {
   const retarget::AccuracyReport& report = run.accuracy;
   if (report.finest_ms_per_sim_s == 0) return {};
-  char text[280];
+  char text[320];
   std::snprintf(text, sizeof text,
-                "accuracy: %.3g %% of L on %d nodes by '%s' in steps of %.3g s, %.3g ms of the processor for a simulated second; the most "
-                "accurate that was tried takes %.3g ms\n",
-                100 * report.estimated_error_length, run.body.nodes, report.method.c_str(), report.dt_s, report.ms_per_sim_s,
+                "accuracy: %.3g %% of L over %.3g s on %d nodes by '%s' in steps of %.3g s, %.3g ms of the processor for a simulated "
+                "second; the most accurate that was tried takes %.3g ms\n",
+                100 * report.estimated_error_length, report.estimated_span_s, run.body.nodes, report.method.c_str(), report.dt_s, report.ms_per_sim_s,
                 report.finest_ms_per_sim_s);
   return text;
 }
@@ -243,11 +301,14 @@ std::string too_inaccurate(const std::string& where, const retarget::AccuracyRep
   return one_line({where, "accuracy", text, "Ask for a larger --max-error or let --method be auto"});
 }
 
+std::string refuse_empty(const std::string& text) { return text.empty() ? "is empty" : ""; }
+
 void add_accuracy_options(CLI::App& app, AskedAccuracy& asked) {
   CLI::Option* most = app.add_option(
       "--max-error", asked.max_error,
       "1% or 0.01 of L: the cheapest method and step are taken that stay within it, as measured on this body; by convert the cheapest "
       "number of harmonics and, without --nodes, control mesh too");
+  most->check(refuse_empty);
   app.add_option("--accuracy", asked.grade, "draft, standard or final: --max-error 5%, 1% or 0.1%")
       ->check(CLI::IsMember({"draft", "standard", "final"}))
       ->excludes(most);

@@ -7,6 +7,7 @@
 #include "io/accuracy_page.h"
 #include "io/creature_directory.h"
 #include "retarget/performance.h"
+#include "retarget/setting_choice.h"
 
 namespace hydrostat::cli {
 
@@ -35,10 +36,10 @@ struct ChosenStep {
 /// A creature's steps are whole parts of it.
 constexpr double kControlSeconds = 1.0 / 120;
 /// Throws UsageError, in the name of a command, for an error below what the reference can show; a grade is then as near as
-/// that.
+/// that. `duration_s`: of the run that the error is asked for, where it lasts longer than the reference and nothing touches.
 template <int Dim>
 ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, const retarget::ReferenceOf<Dim>& reference,
-                       std::optional<physics::Method> only);
+                       std::optional<physics::Method> only, double duration_s = 0);
 
 /// Of a creature: what keeps its open loop near in short windows that start from its target, and then its closed loop, which
 /// has to stay up where the finest does.
@@ -75,6 +76,9 @@ std::string saved_words(const retarget::RunReport& run);
 
 /// The line that tells of an error above what was asked for.
 std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report);
+
+/// Complains of an option that is told and yet empty.
+std::string refuse_empty(const std::string& text);
 
 /// Adds both options; they exclude each other.
 void add_accuracy_options(CLI::App& app, AskedAccuracy& asked);

@@ -98,11 +98,21 @@ class Bench {
       std::visit([&]<int Dim>(const retarget::ScenarioOf<Dim>&) { of_scene<Dim>(scene); }, scene.scenario);
     }
     refuse_below_floor(command_.max_error, curve_.max_error, curve_.floor);
+    if (command_.max_error.empty() && curve_.max_error <= curve_.floor) ask_for_least();
     curve_.recommended = retarget::cheapest_within(curve_.rows, curve_.max_error * length_);
     return std::move(curve_);
   }
 
  private:
+  /// The usual error cannot be told: the least that can is marked, and the page says so.
+  void ask_for_least() {
+    char text[160];
+    std::snprintf(text, sizeof text, " The usual %.3g %% cannot be told by it: marked is the least work within the least error that can.",
+                  100 * curve_.max_error);
+    curve_.truth += text;
+    curve_.max_error = curve_.floor;
+  }
+
   template <int Dim>
   void of_scene(const io::SceneFile& scene) {
     scene_file_ = scene.file;
@@ -308,7 +318,8 @@ void add_bench_accuracy(CLI::App& bench, int& exit_code) {
       bench.add_subcommand("accuracy", "Error against time: methods, steps, elements, nodes (harmonics of a creature)");
   sub->add_option("SCENE|DIR", command->subject, "TOML file (README, 'Scene files') or creature")->required();
   sub->add_option("-o,--out", command->out, "Directory for accuracy.csv, accuracy.svg and accuracy.html")->required();
-  sub->add_option("--max-error", command->max_error, "The error, 1% or 0.01 of L, within which the cheapest is marked [1%]");
+  sub->add_option("--max-error", command->max_error, "The error, 1% or 0.01 of L, within which the cheapest is marked [1%, or the least that can be told]")
+      ->check(refuse_empty);
   sub->add_option("--duration", command->duration, "Seconds of the motion that are compared, at most [1]")
       ->check(number_within(0.1, 60));
   sub->add_flag("--own-mesh", command->own_mesh, "Only the scene's or creature's own mesh: errors are those of methods and steps alone");

@@ -95,7 +95,10 @@ bool Conversion::take_mesh(Conversion& coarser, int wished, const retarget::Step
   if (!is_cheaper) return false;
   coarser.key_ = coarser.solved_key_;
   coarser.perform();
-  if (is_down(coarser.performances_.main()) || strays(*chosen_, coarser.performances_.main())) return false;
+  if (is_down(coarser.performances_.main()) || strays(*chosen_, coarser.performances_.main())) {
+    chosen_->curve.rows.back().is_refused = true;
+    return false;
+  }
   chosen_ = std::move(chosen);
   take_over(coarser);
   return true;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "cli/asked_accuracy.h"
 #include "cli/number_option.h"
 #include "retarget/error.h"
 
@@ -27,6 +28,7 @@ void add_level_options(CLI::App& app, AskedLevel& asked) {
       "--lod", asked.lod,
       "Replay on another control mesh of about so many nodes, 20 to 5000, by a plan of its own with the same edits; auto: the "
       "finest of an eighth, a quarter, half, one, two and four times the creature's that --budget allows and that keeps its way");
+  lod->check(refuse_empty);
   app.add_option("--budget", asked.budget,
                  "2ms: processor time of solver and corrector that a frame of 1/60 s may take, by counted work")
       ->needs(lod);

@@ -216,6 +216,14 @@ void warn_of_lost_way(const retarget::Replay& run, std::vector<std::string>& war
   warnings.emplace_back(text);
 }
 
+/// Where no report does.
+void tell_accuracy(const ChosenStep& chosen, const retarget::Performer& performer) {
+  retarget::RunReport run;
+  run.accuracy = told(chosen);
+  run.body.nodes = performer.mesh.node_count();
+  std::cout << saved_words(run);
+}
+
 int replay(const ReplayCommand& command) {
   if (!command.out.empty() && fs::path(command.out).extension() != ".glb") {
     throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
@@ -267,6 +275,7 @@ int replay(const ReplayCommand& command) {
   if (!command.json) tell_level(creature.target.report.level, command.directory);
   if (!writer) {
     const int exit_code = write_motion(command, performer, creature.appearance, performances);
+    if (chosen) tell_accuracy(*chosen, performer);
     if (is_met || exit_code != kDone) return exit_code;
     std::cerr << too_inaccurate(command.directory, told(*chosen)) << std::endl;
     return kShortOfTarget;

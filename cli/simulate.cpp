@@ -28,7 +28,7 @@ namespace {
 
 constexpr const char* kCommand = "hydrostat simulate";
 constexpr double kLongest = 3600;       // [s]
-constexpr double kLongestMeasured = 2;  // [s] of the motion, where --max-error is asked for
+constexpr double kFirstMeasured = 2;    // [s] of the motion, on which most settings are tried where --max-error is asked for
 constexpr double kLargestTrace = 4e9;   // [bytes]
 
 struct SimulateCommand {
@@ -88,11 +88,11 @@ void refuse_large_trace(const SimulateCommand& command, const retarget::Simulati
 /// Takes the cheapest method and step that keep the error asked for, and tells of them.
 ChosenStep choose(const SimulateCommand& command, io::SceneFile& scene) {
   retarget::AccuracyOptions options;
-  options.duration_s = std::min(kLongestMeasured, scene.duration_s);
+  options.duration_s = std::min(kFirstMeasured, scene.duration_s);
   return std::visit(
       [&]<int Dim>(const retarget::ScenarioOf<Dim>& scenario) {
         ChosenStep chosen = choose_step(command.accuracy, kCommand, retarget::make_reference(scenario, options),
-                                        scene.method_is_auto ? std::nullopt : std::optional(scene.method));
+                                        scene.method_is_auto ? std::nullopt : std::optional(scene.method), scene.duration_s);
         scene.method = chosen.setting.method;
         scene.dt_s = chosen.setting.dt_s;
         return chosen;
@@ -213,15 +213,19 @@ int simulate(const SimulateCommand& command) {
         auto written = retarget::written_scenario(scenario);
         refuse_large_trace(command, options, written.scene.body.node_count(), written.scene.body.edge_count());
         // A second thread measures the error meanwhile; without one it is done when it is asked for.
-        std::future<double> error = std::async(
+        std::future<retarget::EstimatedError> error = std::async(
             command.threads > 1 ? std::launch::async : std::launch::deferred, [alone = scenario, &options, &command] {
-              return command.accuracy.is_asked() ? 0 : retarget::estimated_error(alone, options);
+              return command.accuracy.is_asked() ? retarget::EstimatedError() : retarget::estimated_error(alone, options);
             });
         scenario.scene.threads = std::max(1, command.threads - 1);
         retarget::Simulation run = stages.run("simulation", [&] { return retarget::simulate(scenario, options); });
         stages.run("measurement", [&] {
           fill_report(scene, scenario, written, options, report);
-          if (!command.accuracy.is_asked()) report.accuracy.estimated_error_length = error.get();
+          if (!command.accuracy.is_asked()) {
+            const retarget::EstimatedError estimate = error.get();
+            report.accuracy.estimated_error_length = estimate.error_length;
+            report.accuracy.estimated_span_s = estimate.span_s;
+          }
           return 0;
         });
         scenario = std::move(written);

@@ -52,7 +52,11 @@ struct Axis {
   }
 };
 
-std::string grid(const Axis& x, const Axis& y) {
+double AccuracyRow::* time_of(const AccuracyCurve& curve) {
+  return curve.is_counted ? &AccuracyRow::work_ms : &AccuracyRow::ms_per_sim_s;
+}
+
+std::string grid(const Axis& x, const Axis& y, bool is_counted) {
   std::string svg;
   for (double d = x.low; d <= x.high + 0.5; ++d) {
     const std::string at = short_number(x.at(std::pow(10, d)), 5);
@@ -67,7 +71,7 @@ std::string grid(const Axis& x, const Axis& y) {
            "\" text-anchor=\"end\">" + short_number(100 * std::pow(10, d), 7) + " %</text>\n";
   }
   svg += "<text x=\"" + short_number((kLeft + kWidth - kRight) / 2) + "\" y=\"" + short_number(kHeight - 12) +
-         "\" text-anchor=\"middle\">processor time [ms for a simulated second]</text>\n";
+         "\" text-anchor=\"middle\">processor time" + (is_counted ? ", as counted" : "") + " [ms for a simulated second]</text>\n";
   svg += "<text transform=\"translate(16 " + short_number((kTop + kHeight - kBottom) / 2) +
          ") rotate(-90)\" text-anchor=\"middle\">error [% of L, RMS over the skin]</text>\n";
   return svg;
@@ -76,13 +80,37 @@ std::string grid(const Axis& x, const Axis& y) {
 std::string sentence(const AccuracyCurve& curve) {
   if (curve.recommended < 0) return "No setting stays within " + percent(curve.max_error) + " of L.";
   const AccuracyRow& row = curve.rows[static_cast<std::size_t>(curve.recommended)];
-  return "Ringed: the least work within " + percent(curve.max_error) + " of L: " + name_of(row) + ".";
+  const std::string loop = row.loop_error_m >= 0 ? " over the closed loop too" : "";
+  return "Ringed: the least work within " + percent(curve.max_error) + " of L" + loop + ": " + name_of(row) + ".";
+}
+
+std::string second_sentence(const AccuracyCurve& curve) {
+  std::string text = "Down and to the left is better; the line joins what nothing beats in both.";
+  if (std::any_of(curve.rows.begin(), curve.rows.end(), [](const AccuracyRow& row) { return row.is_refused; })) {
+    text += " Crossed: refused, for the whole walk fell or strayed.";
+  }
+  return text;
+}
+
+/// A cross over a point of what was refused.
+std::string cross(double x, double y) {
+  std::string svg;
+  for (const double slope : {1.0, -1.0}) {
+    svg += "<line x1=\"" + short_number(x - 6, 5) + "\" x2=\"" + short_number(x + 6, 5) + "\" y1=\"" + short_number(y - 6 * slope, 5) +
+           "\" y2=\"" + short_number(y + 6 * slope, 5) + "\" stroke=\"#c33\" stroke-width=\"1.5\"/>";
+  }
+  return svg;
+}
+
+std::string loop_in_words(const AccuracyRow& row, double length_per_m) {
+  if (row.falls) return "falls";
+  return row.loop_error_m >= 0 ? short_number(100 * row.loop_error_m * length_per_m) : "-";
 }
 
 std::string table(const AccuracyCurve& curve, const std::vector<bool>& front) {
   std::string html =
       "<table><tr><th>method<th>element<th>material<th>nodes<th>step [ms]<th>iterations a step<th>harmonics<th>error [m]<th>error [% "
-      "L]<th>ms a "
+      "L]<th>closed loop [% L]<th>ms a "
       "second<th>counted [ms]<th>volume's error [%]<th>momentum unexplained [m g]<th>angular [m g "
       "L]<th>stable<th>front</tr>\n";
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
@@ -91,11 +119,12 @@ std::string table(const AccuracyCurve& curve, const std::vector<bool>& front) {
             (static_cast<int>(k) == curve.recommended ? " class=\"chosen\"" : "") + "><td>" + row.method + "<td>" +
             row.element + "<td>" + row.material + "<td>" + std::to_string(row.nodes) + "<td>" + short_number(1000 * row.dt_s) + "<td>" +
             short_number(row.iterations) + "<td>" + (row.harmonics > 0 ? std::to_string(row.harmonics) : "-");
-    for (const double value : {row.error_rms_m, 100 * row.error_rel_length, row.ms_per_sim_s, row.work_ms,
-                               100 * row.volume_error, row.momentum_error, row.angular_error}) {
-      html += "<td>" + (std::isfinite(value) ? short_number(value) : std::string("-"));
-    }
-    html += std::string("<td>") + (row.falls ? "falls" : row.stable ? "yes" : "no") + "<td>" + (front[k] ? "yes" : "") + "</tr>\n";
+    const auto add = [&](double value) { html += "<td>" + (std::isfinite(value) ? short_number(value) : std::string("-")); };
+    add(row.error_rms_m);
+    add(100 * row.error_rel_length);
+    html += "<td>" + loop_in_words(row, row.error_rms_m > 0 ? row.error_rel_length / row.error_rms_m : 0);
+    for (const double value : {row.ms_per_sim_s, row.work_ms, 100 * row.volume_error, row.momentum_error, row.angular_error}) add(value);
+    html += std::string("<td>") + (row.falls ? "falls" : row.is_refused ? "refused" : row.stable ? "yes" : "no") + "<td>" + (front[k] ? "yes" : "") + "</tr>\n";
   }
   return html + "</table>\n";
 }
@@ -123,9 +152,10 @@ namespace {
 /// `has_links`: every point leads to `#row<n>`.
 std::string diagram(const AccuracyCurve& curve, bool has_links) {
   Axis x(kLeft, kWidth - kRight), y(kHeight - kBottom, kTop);
+  const auto time = time_of(curve);
   for (const AccuracyRow& row : curve.rows) {
     if (!row.stable && !row.falls) continue;
-    x.hold(row.ms_per_sim_s);
+    x.hold(row.*time);
     y.hold(std::max(row.error_rel_length, 0.1 * curve.floor));
   }
   x.finish();
@@ -136,46 +166,46 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
       "fill=\"#fff\"/>\n<text x=\"" +
       short_number(kLeft) + "\" y=\"20\" font-size=\"14\" font-weight=\"bold\">What accuracy costs: " + escaped(curve.subject) +
       "</text>\n<text x=\"" + short_number(kLeft) + "\" y=\"38\">" + escaped(sentence(curve)) + "</text>\n<text x=\"" +
-      short_number(kLeft) + "\" y=\"53\">Down and to the left is better; the line joins what nothing beats in both.</text>\n";
-  svg += grid(x, y);
+      short_number(kLeft) + "\" y=\"53\">" + second_sentence(curve) + "</text>\n";
+  svg += grid(x, y, curve.is_counted);
   if (curve.floor > 0) {
     svg += "<line x1=\"" + short_number(kLeft) + "\" x2=\"" + short_number(kWidth - kRight) + "\" y1=\"" + short_number(y.at(curve.floor), 5) +
            "\" y2=\"" + short_number(y.at(curve.floor), 5) + "\" stroke=\"#c33\" stroke-dasharray=\"4 3\"/><text x=\"" +
            short_number(kWidth - kRight + 4) + "\" y=\"" + short_number(y.at(curve.floor) + 4, 5) +
            "\" fill=\"#c33\">the reference's own</text>\n";
   }
-  const std::vector<bool> front = retarget::pareto_front(curve.rows);
+  const std::vector<bool> front = retarget::pareto_front(curve.rows, time);
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
     if (front[k]) order.push_back(k);
   }
   std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return curve.rows[a].ms_per_sim_s < curve.rows[b].ms_per_sim_s; });
+            [&](std::size_t a, std::size_t b) { return curve.rows[a].*time < curve.rows[b].*time; });
   std::string line;
   for (const std::size_t k : order) {
-    line += short_number(x.at(curve.rows[k].ms_per_sim_s), 5) + "," + short_number(y.at(curve.rows[k].error_rel_length), 5) + " ";
+    line += short_number(x.at(curve.rows[k].*time), 5) + "," + short_number(y.at(curve.rows[k].error_rel_length), 5) + " ";
   }
   svg += "<polyline fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.5\" points=\"" + line + "\"/>\n";
   std::vector<std::string> methods;
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
     const AccuracyRow& row = curve.rows[k];
     if (row.falls) {
-      svg += "<text x=\"" + short_number(x.at(row.ms_per_sim_s), 5) + "\" y=\"" + short_number(y.at(row.error_rel_length) + 4, 5) +
+      svg += "<text x=\"" + short_number(x.at(row.*time), 5) + "\" y=\"" + short_number(y.at(row.error_rel_length) + 4, 5) +
              "\" text-anchor=\"middle\" fill=\"#c33\">&#215; " + std::to_string(row.nodes) + " nodes: falls</text>\n";
     }
     if (!row.stable) continue;
     if (std::find(methods.begin(), methods.end(), row.method) == methods.end()) methods.push_back(row.method);
     const std::string at =
-        "cx=\"" + short_number(x.at(row.ms_per_sim_s), 5) + "\" cy=\"" + short_number(y.at(row.error_rel_length), 5) + "\"";
+        "cx=\"" + short_number(x.at(row.*time), 5) + "\" cy=\"" + short_number(y.at(row.error_rel_length), 5) + "\"";
     svg += (has_links ? "<a href=\"#row" + std::to_string(k) + "\">" : std::string("<g>")) + "<title>" +
-           escaped(name_of(row)) + ": " + percent(row.error_rel_length) + " of L, " + short_number(row.ms_per_sim_s) +
-           " ms a second</title>";
+           escaped(name_of(row)) + ": " + percent(row.error_rel_length) + " of L, " + short_number(row.*time) +
+           " ms a second" + (row.is_refused ? ", refused by its closed loop" : "") + "</title>";
     if (static_cast<int>(k) == curve.recommended)
       svg += "<circle " + at + " r=\"10\" fill=\"none\" stroke=\"#000\" stroke-width=\"2\"/>";
     const bool is_box = row.element == "hex" || row.element == "quad";
     svg += "<circle " + at + " r=\"" + (front[k] ? "5" : "4") + "\" stroke=\"" + colour_of(row.method) +
            "\" stroke-width=\"1.5\" fill=\"" + (is_box ? "#fff" : colour_of(row.method)) + "\" fill-opacity=\"" +
-           (front[k] ? "1" : "0.5") + "\"/>" + (has_links ? "</a>\n" : "</g>\n");
+           (front[k] ? "1" : "0.5") + "\"/>" + (row.is_refused ? cross(x.at(row.*time), y.at(row.error_rel_length)) : "") + (has_links ? "</a>\n" : "</g>\n");
   }
   for (std::size_t m = 0; m < methods.size(); ++m) {
     svg += "<text x=\"" + short_number(kWidth - kRight + 14) + "\" y=\"" + short_number(kTop + 14 + 16 * static_cast<double>(m)) +
@@ -204,8 +234,9 @@ std::string accuracy_page(const AccuracyCurve& curve) {
       escaped(curve.subject) + "</h1>\n<p>" + escaped(curve.truth) + " No error below " + percent(curve.floor) +
       " of L can be told by it. A click on a point leads to its row; empty points are of hexahedra or quads. Choices go by "
       "counted work, which "
-      "is the same on every machine; the picture shows this machine's processor time.</p>\n";
-  return html + diagram(curve, true) + table(curve, retarget::pareto_front(curve.rows)) + "</html>\n";
+      "is the same on every machine; the picture shows " +
+      (curve.is_counted ? "it" : "this machine's processor time") + ".</p>\n";
+  return html + diagram(curve, true) + table(curve, retarget::pareto_front(curve.rows, time_of(curve))) + "</html>\n";
 }
 
 std::string accuracy_json(const AccuracyCurve& curve) {
@@ -217,7 +248,7 @@ std::string accuracy_json(const AccuracyCurve& curve) {
   json["floor"] = curve.floor;
   json["recommended"] = curve.recommended;
   json["rows"] = nlohmann::ordered_json::array();
-  const std::vector<bool> front = retarget::pareto_front(curve.rows);
+  const std::vector<bool> front = retarget::pareto_front(curve.rows, time_of(curve));
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
     const AccuracyRow& row = curve.rows[k];
     json["rows"].push_back({{"method", row.method},
@@ -236,6 +267,8 @@ std::string accuracy_json(const AccuracyCurve& curve) {
                             {"angular_error", row.angular_error},
                             {"stable", row.stable},
                             {"falls", row.falls},
+                            {"loop_error_m", row.loop_error_m >= 0 ? nlohmann::ordered_json(row.loop_error_m) : nlohmann::ordered_json()},
+                            {"refused", row.is_refused},
                             {"on_front", static_cast<bool>(front[k])}});
   }
   return json.dump(1) + "\n";

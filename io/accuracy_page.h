@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "retarget/accuracy.h"
+#include "retarget/setting_choice.h"
 
 namespace hydrostat::io {
 
@@ -15,6 +15,7 @@ struct AccuracyCurve {
   int recommended = -1;  // the cheapest row by counted work within max_error; -1: none
   double max_error = 0;  // per L
   double floor = 0;      // per L: no error below it can be told
+  bool is_counted = false;  // drawn over counted work, by which the ringed one was chosen; else over the clock's time
 };
 
 /// A table with a header, one line a row: method, element, nodes, dt_s, iterations, harmonics, error_rms_m,

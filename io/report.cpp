@@ -199,6 +199,11 @@ void fill(Group& group, const retarget::AccuracyReport& accuracy) {
   group.add("material", accuracy.material);
   group.add("dt_s", accuracy.dt_s);
   group.add("estimated_error_length", accuracy.estimated_error_length);
+  if (accuracy.estimated_span_s > 0) {
+    group.add("estimated_span_s", accuracy.estimated_span_s);
+  } else {
+    group.add_nothing("estimated_span_s");
+  }
   if (accuracy.max_error_length > 0) {
     group.add("max_error_length", accuracy.max_error_length);
     group.add("work_saved", accuracy.work_saved);

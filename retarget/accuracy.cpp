@@ -20,8 +20,10 @@ constexpr double kAgreement = 2;             // of what two methods leave open [
 constexpr int kMostPasses = 4000;            // of the explicit method in a frame: what wants more is not tried
 constexpr int kLeastFrames = 2;
 // What an estimate may cost beside a run that asked for no bound.
-constexpr double kEstimatedSeconds = 1;  // of the motion, at most
+constexpr double kEstimatedSeconds = 1;  // of the motion, with contact; without, what tells what the whole run would cost
 constexpr int kEstimatedWindows = 4;
+constexpr double kEstimateRuns = 4;     // counted work of an estimate over that of the run it is about [-], at most; but less than
+constexpr double kEstimateWork = 5000;  // [ms] is never too much
 
 /// The scenario as it is at another time than 0.
 template <int Dim>
@@ -281,6 +283,7 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   row.momentum_error = repeated.worst.momentum_residual_mg;
   row.angular_error = repeated.worst.angular_residual_mgl;
   row.stable = repeated.is_whole && row.error_rel_length < 1;
+  if (!repeated.is_whole) row.ms_per_sim_s = row.volume_error = row.momentum_error = row.angular_error = std::nan("");
   return row;
 }
 
@@ -305,72 +308,34 @@ std::vector<std::vector<StepSetting>> settings_to_try(const physics::SceneOf<Dim
   return all;
 }
 
-std::vector<bool> pareto_front(const std::vector<AccuracyRow>& rows) {
-  std::vector<bool> front(rows.size(), false);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    front[i] = rows[i].stable;
-    for (std::size_t j = 0; j < rows.size() && front[i]; ++j) {
-      if (i == j || !rows[j].stable) continue;
-      const bool no_worse = rows[j].error_rms_m <= rows[i].error_rms_m && rows[j].ms_per_sim_s <= rows[i].ms_per_sim_s;
-      const bool better = rows[j].error_rms_m < rows[i].error_rms_m || rows[j].ms_per_sim_s < rows[i].ms_per_sim_s || j < i;
-      if (no_worse && better) front[i] = false;
-    }
-  }
-  return front;
-}
+namespace {
 
-int cheapest_within(const std::vector<AccuracyRow>& rows, double most_m) {
-  int best = -1;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (!rows[k].stable || !(rows[k].error_rms_m <= most_m)) continue;
-    if (best < 0 || rows[k].work_ms < rows[static_cast<std::size_t>(best)].work_ms) best = static_cast<int>(k);
-  }
-  return best;
-}
-
-int most_accurate(const std::vector<AccuracyRow>& rows) {
-  int best = -1;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (!rows[k].stable) continue;
-    if (best < 0 || rows[k].error_rms_m < rows[static_cast<std::size_t>(best)].error_rms_m) best = static_cast<int>(k);
-  }
-  return best;
-}
+/// How far a setting and what is held against it part over a stretch of the motion.
+struct Parted {
+  double distance_m = 0, span_s = 0;
+  double coarse_ms = 0, fine_ms = 0;  // counted, of a simulated second
+};
 
 template <int Dim>
-StepChoice choose_setting(const ReferenceOf<Dim>& reference, double most_m, std::optional<physics::Method> only) {
-  StepChoice choice;
-  std::vector<StepSetting> settings;
-  const double room = most_m - reference.uncertainty_m();
-  for (const std::vector<StepSetting>& of_method :
-       settings_to_try(reference.scenario.scene, reference.options.step_frame_s)) {
-    if (only && of_method.front().method != *only) continue;
-    for (const StepSetting& setting :
-         of_method) {  // shorter steps cost more: the first that will do is the method's cheapest
-      choice.tried.push_back(measure_error(reference, reference.scenario, setting));
-      settings.push_back(setting);
-      const int best = cheapest_within(choice.tried, room);
-      if (best >= 0 && choice.tried.back().work_ms >= choice.tried[static_cast<std::size_t>(best)].work_ms) break;
-    }
-  }
-  int best = cheapest_within(choice.tried, room);
-  choice.is_met = best >= 0;
-  if (!choice.is_met) best = most_accurate(choice.tried);
-  if (best < 0) best = 0;  // all of them ran away: the caller's own run will tell
-  choice.setting = settings[static_cast<std::size_t>(best)];
-  choice.row = choice.tried[static_cast<std::size_t>(best)];
-  choice.estimated_error_m = choice.row.error_rms_m + reference.uncertainty_m();
-  return choice;
+Parted parted(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options, const StepSetting& coarse, const StepSetting& fine) {
+  const std::vector<WindowOf<Dim>> windows = windows_along(scenario, options, coarse);
+  const ContactPointsOf<Dim>& skin = scenario.scene.contact_points;
+  const Repeated<Dim> a = repeat(scenario, windows, coarse, options.frame_s, skin, false);
+  const Repeated<Dim> b = repeat(scenario, windows, fine, options.frame_s, skin, false);
+  const double seconds = static_cast<double>(windows.size()) * windows.front().duration_s;
+  return {distance<Dim>(a.places, b.places), windows.front().duration_s, counted_ms(scenario.scene, coarse.method, a.work) / seconds,
+          counted_ms(scenario.scene, fine.method, b.work) / seconds};
 }
 
+}  // namespace
+
 template <int Dim>
-double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
+EstimatedError estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
   AccuracyOptions accuracy;
   accuracy.frame_s = options.dt_s * std::max(1.0, std::round(accuracy.frame_s / options.dt_s));
   accuracy.duration_s = std::min(options.duration_s, kEstimatedSeconds);
   accuracy.windows = kEstimatedWindows;
   const StepSetting setting{options.method, options.dt_s};
-  const std::vector<WindowOf<Dim>> windows = windows_along(scenario, accuracy, setting);
   const double substep = physics::make_stepper(options.method, scenario.scene)->substep(options.dt_s);
   StepSetting finer{options.method, options.dt_s / (2 * std::max(1.0, std::round(options.dt_s / substep)))};
   const bool is_accurate = options.method == physics::Method::kExplicit || options.method == physics::Method::kImplicit;
@@ -379,10 +344,14 @@ double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions&
   if (is_stiff || (!is_accurate && finer.dt_s < kShortestStep)) {
     finer = {physics::Method::kImplicit, whole_part(options.dt_s, kImplicitStep)};
   }
-  const ContactPointsOf<Dim>& skin = scenario.scene.contact_points;
-  const auto coarse = repeat(scenario, windows, setting, accuracy.frame_s, skin, false).places;
-  const auto fine = repeat(scenario, windows, finer, accuracy.frame_s, skin, false).places;
-  return (finer.method == options.method ? 2 : 1) * distance<Dim>(coarse, fine) / scenario.length;
+  Parted found = parted(scenario, accuracy, setting, finer);
+  const bool is_free = found.span_s > accuracy.duration_s - accuracy.frame_s;  // neither contact nor a break ended it
+  if (is_free && options.duration_s > accuracy.duration_s) {
+    const double affordable = std::max(kEstimateWork, kEstimateRuns * found.coarse_ms * options.duration_s);
+    accuracy.duration_s = std::min(options.duration_s, affordable / (found.coarse_ms + found.fine_ms));
+    if (accuracy.duration_s > kEstimatedSeconds) found = parted(scenario, accuracy, setting, finer);
+  }
+  return {(finer.method == options.method ? 2 : 1) * found.distance_m / scenario.length, found.span_s};
 }
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                                          \
@@ -394,8 +363,7 @@ double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions&
   template AccuracyRow measure_error<Dim>(const ReferenceOf<Dim>&, const ScenarioOf<Dim>&, const StepSetting&,              \
                                           const std::vector<WindowOf<Dim>>&, const ContactPointsOf<Dim>&);                  \
   template std::vector<std::vector<StepSetting>> settings_to_try<Dim>(const physics::SceneOf<Dim>&, double);                \
-  template StepChoice choose_setting<Dim>(const ReferenceOf<Dim>&, double, std::optional<physics::Method>);                 \
-  template double estimated_error<Dim>(const ScenarioOf<Dim>&, const SimulationOptions&);
+  template EstimatedError estimated_error<Dim>(const ScenarioOf<Dim>&, const SimulationOptions&);
 HYDROSTAT_INSTANTIATE(2)
 HYDROSTAT_INSTANTIATE(3)
 #undef HYDROSTAT_INSTANTIATE

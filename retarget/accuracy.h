@@ -71,10 +71,15 @@ struct AccuracyRow {
   double error_rms_m = 0, error_rel_length = 0;
   double ms_per_sim_s = 0;                       // as the clock of this thread has it
   double work_ms = 0;                            // counted, a simulated second: what choices go by
+  // Of what ran away these are not told (NaN), nor is its time.
   double volume_error = 0;                       // the whole body's, at most
   double momentum_error = 0, angular_error = 0;  // what booked impulses do not explain: m g, m g L
   bool stable = true;                            // finite, and no further away than L
-  bool falls = false;                            // of a creature's level: its closed loop does not stay up; never stable
+  bool falls = false;                            // of a creature: its closed loop does not stay up; never stable
+  // Of a creature: of the skin in its closed loop, from that of the finest setting; where it is larger, the error is it. Below 0
+  // where that was not tried.
+  double loop_error_m = -1;
+  bool is_refused = false;  // for what its closed loop or its whole replay came to
 };
 
 /// Repeats the reference's windows. The scenario may hold the same body in another mesh: starts are then carried over.
@@ -91,29 +96,16 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
 template <int Dim>
 std::vector<std::vector<StepSetting>> settings_to_try(const physics::SceneOf<Dim>& scene, double frame_s);
 
-/// Which rows no other beats in both error and time [ms_per_sim_s]; of equal ones the first.
-std::vector<bool> pareto_front(const std::vector<AccuracyRow>& rows);
-/// The stable row of least counted work whose error is at most `most_m`; none: -1.
-int cheapest_within(const std::vector<AccuracyRow>& rows, double most_m);
-/// The stable row of least error; none: -1.
-int most_accurate(const std::vector<AccuracyRow>& rows);
-
-/// The cheapest setting by counted work whose error stays within a bound, measured on this very body.
-struct StepChoice {
-  StepSetting setting;
-  AccuracyRow row;
-  bool is_met = false;           // false: the setting is the most accurate one that was found
-  double estimated_error_m = 0;  // the row's, and what the reference leaves open
-  std::vector<AccuracyRow> tried;
+struct EstimatedError {
+  double error_length = 0;  // per L, RMS over the skin and time
+  double span_s = 0;        // of the motion that it is about, from its start: with contact, of every window from its own
 };
-/// `only`: no other method is tried.
-template <int Dim>
-StepChoice choose_setting(const ReferenceOf<Dim>& reference, double most_m, std::optional<physics::Method> only);
 
-/// The error of a setting [per L, RMS over the skin] where no bound was asked for, from few runs: its distance to the same
-/// method in half steps, doubled, or to an accurate method where its own limit is another body (xpbd, spring), far (euler)
-/// or out of reach (explicit on a stiff body).
+/// The error of a setting where no bound was asked for, from few runs: its distance to the same method in half steps, doubled,
+/// or to an accurate method where its own limit is another body (xpbd, spring), far (euler) or out of reach (explicit on a stiff
+/// body). Where nothing touches it is that of the whole run (until it breaks), or, where that would cost several times what the
+/// run does, of its first part.
 template <int Dim>
-double estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
+EstimatedError estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
 
 }  // namespace hydrostat::retarget

@@ -104,6 +104,7 @@ struct EffectReport {
 struct AccuracyReport {
   std::string method, element, material;
   double dt_s = 0, estimated_error_length = 0;
+  double estimated_span_s = 0;  // that the estimate is about: with contact of every window, else of the run; 0: not told
   double max_error_length = 0;  // that was asked for; 0: none was
   // Where one was: share of the counted work of the most accurate setting that was tried; processor time [ms] of a simulated second, of
   // the chosen and of that one.

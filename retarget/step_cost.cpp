@@ -46,6 +46,7 @@ constexpr double kProduct[] = {2.1, 15};  // [ns] of two blocks
 // kMuscles' share.
 constexpr double kColumnProduct = 3.8;  // [ns] of a block and one of many columns
 constexpr double kNormal = 0.41;        // [ns] of a product in the normal equations
+constexpr double kPlayed = 0.2;         // [ns] of a channel and a wave of it, two a harmonic, in playing signals
 constexpr double kRows = 11;            // [ns] of a row and a muscle, in all that each call asks of the response
 constexpr double kMuscles = 0.15;       // [ns] of a cubed muscle: solving within the cones
 constexpr double kAnew = 0.66;          // share of the calls that make the response anew: 0.25 to 0.98 in replays of six creatures
@@ -66,6 +67,10 @@ double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, co
 }
 template double counted_ms<2>(const physics::SceneOf<2>&, physics::Method, const physics::StepWork&);
 template double counted_ms<3>(const physics::SceneOf<3>&, physics::Method, const physics::StepWork&);
+
+double counted_ms_of_signals(Eigen::Index channels, int harmonics) {
+  return 1e-6 * kPlayed * static_cast<double>(channels) * 2 * (harmonics + 1);
+}
 
 double counted_ms_of_correction(const physics::Scene& scene, Eigen::Index muscles) {
   const Counts counts = counts_of(scene.body);

@@ -9,6 +9,9 @@ namespace hydrostat::retarget {
 template <int Dim>
 double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, const physics::StepWork& work);
 
+/// Of playing a creature's signals at one time: what fewer harmonics save.
+double counted_ms_of_signals(Eigen::Index channels, int harmonics);
+
 /// The same of one correction by so many muscles, the mean of many: the response of the body to every muscle (its matrix
 /// assembled, factored and solved with, the products of what comes out), and what every call does with it.
 double counted_ms_of_correction(const physics::Scene& scene, Eigen::Index muscles);

@@ -146,7 +146,7 @@ TEST_F(SceneEffects, LetABodyTearWhereItIsMarked) {
   EXPECT_EQ(retarget::simulate(off, options).report.pieces_end, 1);
   const auto rows = retarget::measure_effects(torn, options);
   EXPECT_TRUE(std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.effect == "fracture"; }));
-  EXPECT_LT(retarget::estimated_error(torn, options), 0.05);
+  EXPECT_LT(retarget::estimated_error(torn, options).error_length, 0.05);
 }
 
 TEST_F(SceneEffects, LetNoPartTouchAnotherWhereThatIsTurnedOff) {

@@ -1,10 +1,12 @@
-#include "retarget/accuracy.h"
+#include "retarget/setting_choice.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <ctime>
+#include <optional>
 #include <random>
+#include <utility>
 
 #include "physics/element_body.h"
 #include "retarget/step_cost.h"
@@ -113,13 +115,95 @@ TEST(Accuracy, OfAGivenSettingIsWithinTwiceItsEstimateInNineOfTen) {
     options.duration_s = 0.5;
     options.dt_s = 1.0 / 120;
     options.method = physics::kMethods[seed % 4];  // `spring` is another body
-    const double estimate = estimated_error(scenario, options);
+    const double estimate = estimated_error(scenario, options).error_length;
     const double error = true_error(scenario, short_motion(), {options.method, options.dt_s});
     within += error <= 2 * estimate;
     ++all;
     EXPECT_LT(estimate, 20 * error + 1e-3) << "seed " << seed;  // nor is it mere caution
   }
   EXPECT_GE(within, 0.9 * all);
+}
+
+/// A bar that floats, turns and is bent by its own muscles, without dashpots: errors grow for as long as it goes.
+template <int Dim>
+ScenarioOf<Dim> floating(unsigned seed) {
+  std::mt19937 random(seed);
+  const auto within = [&](double low, double high) {
+    return low + (high - low) * (static_cast<double>(random()) / 4294967295.0);
+  };
+  physics::VectorOf<Dim> size = physics::VectorOf<Dim>::Constant(within(0.12, 0.25));
+  size[0] = within(0.4, 0.8);
+  Eigen::Matrix<int, Dim, 1> cells = Eigen::Matrix<int, Dim, 1>::Ones();
+  cells[0] = 4;
+  const physics::SimplexMeshOf<Dim> mesh = physics::mesh_of_box<Dim>(size, cells);
+  const physics::ElementMesh<Dim> elements{
+      mesh.nodes, mesh.simplices, {{1000, std::pow(10, within(4.5, 5.5)), 0.35}}, Eigen::VectorXd::Ones(mesh.simplices.cols())};
+  ScenarioOf<Dim> scenario;
+  scenario.scene.body = make_spring_body<Dim>(elements, 0);
+  scenario.scene.has_ground = false;
+  scenario.scene.gravity.setZero();
+  physics::touch_with_whole_surface(scenario.scene);
+  scenario.start = {mesh.nodes, physics::PointsOf<Dim>::Zero(Dim, mesh.nodes.cols())};
+  const double turn = within(1, 4), rate = within(4, 13), amplitude = within(0.05, 0.2);
+  scenario.start.v.row(0) = -turn * mesh.nodes.row(1);
+  scenario.start.v.row(1) = turn * mesh.nodes.row(0);
+  Eigen::VectorXd strength = Eigen::VectorXd::Zero(scenario.scene.body.edge_count());  // of one side alone
+  for (Eigen::Index e = 0; e < strength.size(); ++e) {
+    const auto ends = scenario.scene.body.edges.col(e);
+    if (mesh.nodes(1, ends[0]) + mesh.nodes(1, ends[1]) > 0) strength[e] = amplitude;
+  }
+  scenario.drive = [=](double time_s, Eigen::VectorXd& activation) { activation = (1 - strength.array() * std::sin(rate * time_s)).matrix(); };
+  scenario.length = size[0];
+  scenario.size = physics::size_of_volume<Dim>(scenario.scene.body.rest_volume.sum());
+  return scenario;
+}
+
+/// Of a choice for the whole of a run eight times as long as the first part, and of settings nobody chose: how often the true
+/// error over all of it is within twice the estimate.
+template <int Dim>
+std::pair<int, int> whole_runs_within(unsigned first_seed, unsigned count) {
+  AccuracyOptions first, all;
+  first.duration_s = 0.4;
+  all.duration_s = 3.2;
+  int chosen = 0, given = 0;
+  for (unsigned seed = first_seed; seed < first_seed + count; ++seed) {
+    const ScenarioOf<Dim> scenario = floating<Dim>(seed);
+    const ReferenceOf<Dim> reference = make_reference(scenario, first, false);
+    const double most_m = 0.05 * scenario.length;
+    const std::optional<ReferenceOf<Dim>> whole = reference_of_whole(reference, all.duration_s);
+    EXPECT_TRUE(whole);
+    if (!whole) continue;
+    const StepChoice choice = choose_for_whole(*whole, choose_setting(reference, most_m, std::nullopt), most_m, std::nullopt);
+    AccuracyOptions fine = all;
+    fine.fineness = 8;
+    const ReferenceOf<Dim> truth = make_reference(scenario, fine, false);
+    const double error_m = measure_error(truth, scenario, choice.setting).error_rms_m;
+    chosen += error_m <= 2 * choice.estimated_error_m;
+    EXPECT_TRUE(choice.is_met) << "seed " << seed;
+    EXPECT_LT(error_m, 2 * most_m) << "seed " << seed;
+    SimulationOptions options;
+    options.duration_s = all.duration_s;
+    options.dt_s = 1.0 / 120;
+    options.method = physics::kMethods[seed % 5];
+    const EstimatedError estimate = estimated_error(scenario, options);
+    EXPECT_NEAR(estimate.span_s, options.duration_s, 0.05);
+    const AccuracyRow row = measure_error(truth, scenario, {options.method, options.dt_s});
+    given += row.error_rel_length <= 2 * estimate.error_length;
+  }
+  return {chosen, given};
+}
+
+TEST(Accuracy, OfAWholeRunIsWithinTwiceTheEstimateInNineOfTen) {
+  const unsigned count = trials(10u);
+  const auto [chosen, given] = whole_runs_within<2>(400, count);
+  EXPECT_GE(chosen, 0.9 * count);
+  EXPECT_GE(given, 0.9 * count);
+}
+
+TEST(Accuracy, OfAWholeRunInSpaceIsWithinTwiceTheEstimate) {
+  const auto [chosen, given] = whole_runs_within<3>(500, 3);
+  EXPECT_EQ(chosen, 3);
+  EXPECT_EQ(given, 3);
 }
 
 /// Its dashpots, as strong as a large body's, ask the explicit method for steps of nanoseconds.
@@ -135,7 +219,7 @@ TEST(Accuracy, OfATinyBodyIsFoundWithoutItsExplicitSteps) {
   scenario.length = 0.001;
   scenario.size = physics::size_of_volume<2>(scenario.scene.body.rest_volume.sum());
   const std::clock_t begin = std::clock();
-  const double estimate = estimated_error(scenario, {.duration_s = 0.5});
+  const double estimate = estimated_error(scenario, {.duration_s = 0.5}).error_length;
   EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 20);
   EXPECT_GT(estimate, 0);
   EXPECT_LT(estimate, 0.1);

@@ -247,10 +247,10 @@ TYPED_TEST(Simulations, ErrLessTheShorterTheStep) {
   SimulationOptions options;
   options.method = physics::Method::kEuler;
   options.duration_s = 0.3;
-  const double coarse = estimated_error(scenario, options);
+  const double coarse = estimated_error(scenario, options).error_length;
   options.dt_s /= 4;
   EXPECT_GT(coarse, 1e-5);
-  EXPECT_LT(estimated_error(scenario, options), 0.6 * coarse);
+  EXPECT_LT(estimated_error(scenario, options).error_length, 0.6 * coarse);
 }
 
 /// A block of a material, evenly strained, holds the energy that Hooke's law gives: the mean over many directions.

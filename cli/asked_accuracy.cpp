@@ -87,6 +87,21 @@ void add_signals(retarget::AccuracyRow& row, const retarget::SignalSet& signals,
   row.ms_per_sim_s += ms;
 }
 
+/// The candidate of the least error, where none keeps what was asked for; what is within it and was refused fell or strayed in the end.
+void take_nearest(ChosenStep& chosen, double floor_m, double length) {
+  const retarget::AccuracyRow* nearest = nullptr;
+  for (const int k : chosen.candidates) {
+    const retarget::AccuracyRow& row = chosen.curve.rows[static_cast<std::size_t>(k)];
+    const bool has_strayed = row.is_refused && row.error_rms_m <= chosen.report.max_error_length * length - floor_m;
+    if (row.stable && !has_strayed && (!nearest || row.error_rms_m < nearest->error_rms_m)) nearest = &row;
+  }
+  chosen.curve.recommended = -1;
+  chosen.report.work_saved = chosen.report.ms_per_sim_s = chosen.report.finest_ms_per_sim_s = 0;
+  if (!nearest) return;
+  chosen.setting = {*physics::method_named(nearest->method), nearest->dt_s};
+  chosen.report.estimated_error_length = (nearest->error_rms_m + floor_m) / length;
+}
+
 /// The first of the candidates from the present one on whose closed loop stays near the finest one's, and up; the finest at
 /// the latest.
 void take_candidate(ChosenStep& chosen, const retarget::Performer& performer, const retarget::SignalSet& signals) {
@@ -100,9 +115,10 @@ void take_candidate(ChosenStep& chosen, const retarget::Performer& performer, co
     const bool is_last = chosen.candidate + 1 == chosen.candidates.size();
     const bool is_finest = is_last && chosen.setting.method == chosen.reference->setting.method;
     const double loop_m = is_finest ? 0 : closed_loop_error(*chosen.finest, performer, performer, signals, chosen.setting);
-    const bool is_refused = refuses(loop_m, most_m, performer.length, row);
+    const bool is_refused = refuses(loop_m, most_m, performer.length, row) && !is_finest;
     chosen.report.estimated_error_length = row.falls ? HUGE_VAL : (row.error_rms_m + floor_m) / performer.length;
     tell_saved(rows, chosen.curve.recommended, chosen.candidates.back(), chosen.report);
+    if (is_last && is_refused) take_nearest(chosen, floor_m, performer.length);
     if (is_last || !is_refused) return;
   }
 }

@@ -278,7 +278,11 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   row.error_rms_m = distance<Dim>(reference.places, repeated.places);
   row.error_rel_length = row.error_rms_m / reference.scenario.length;
   if (repeated.seconds > 0) row.ms_per_sim_s = 1000 * repeated.busy_s / repeated.seconds;
-  if (repeated.seconds > 0) row.work_ms = counted_ms(scenario.scene, setting.method, repeated.work) / repeated.seconds;
+  if (repeated.seconds > 0) {
+    row.work_ms = (counted_ms(scenario.scene, setting.method, repeated.work) +
+                   counted_ms_of_steps(scenario.scene, setting.method, repeated.steps)) /
+                  repeated.seconds;
+  }
   row.volume_error = repeated.worst.volume_error_max;
   row.momentum_error = repeated.worst.momentum_residual_mg;
   row.angular_error = repeated.worst.angular_residual_mgl;

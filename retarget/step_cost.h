@@ -9,6 +9,10 @@ namespace hydrostat::retarget {
 template <int Dim>
 double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, const physics::StepWork& work);
 
+/// Of outer steps beside their substeps: a guarded method looks at every one. Only `explicit` can have so many that it shows.
+template <int Dim>
+double counted_ms_of_steps(const physics::SceneOf<Dim>& scene, physics::Method method, double steps);
+
 /// Of playing a creature's signals at one time: what fewer harmonics save.
 double counted_ms_of_signals(Eigen::Index channels, int harmonics);
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "io/accuracy_page.h"
 #include "tests/cli/run_program.h"
 #include "tests/sanitizers.h"
 
@@ -86,6 +87,58 @@ TEST_F(AccuracyCommands, RefuseWhatCannotBeToldAndTellWhatIsPossible) {
   EXPECT_GT(report("out")["accuracy"]["estimated_error_length"], 0.0025);
   EXPECT_EQ(run("simulate scene.toml -o out --max-error 70% --quiet").exit_code, 2);
   EXPECT_EQ(run("simulate scene.toml -o out --max-error 1% --accuracy draft --quiet").exit_code, 2);
+}
+
+TEST_F(AccuracyCommands, TellOfHowMuchOfTheRunTheErrorIs) {
+  const std::string floating = "dimension = 2\nduration_s = 3.0\ngravity_m_s2 = [0.0, 0.0]\n[body]\nshape = \"bar\"\nsize_m = [0.6, 0.2]\nnodes = 12\nspin_deg_s = 90.0\n";
+  io::write_file(directory.path / "floating.toml", floating);
+  const Outcome outcome = run("simulate floating.toml -o asked --max-error 2% --quiet");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("% of L over 3 s"), std::string::npos) << outcome.out;
+  EXPECT_NEAR(report("asked")["accuracy"]["estimated_span_s"], 3, 1e-9);
+  ASSERT_EQ(run("simulate floating.toml -o given --quiet").exit_code, 0);
+  EXPECT_NEAR(report("given")["accuracy"]["estimated_span_s"], 3, 1e-9);
+  ASSERT_EQ(run("simulate scene.toml -o touching --quiet").exit_code, 0);
+  EXPECT_NEAR(report("touching")["accuracy"]["estimated_span_s"], 0.1, 1e-9);  // of every window
+}
+
+TEST_F(AccuracyCommands, RefuseAnEmptyError) {
+  for (const char* command : {"simulate scene.toml -o out --max-error ''", "bench accuracy scene.toml -o out --max-error ''",
+                              "replay creature --max-error ''", "replay creature --lod ''"}) {
+    const Outcome outcome = run(command);
+    EXPECT_EQ(outcome.exit_code, 2) << command;
+    EXPECT_NE(outcome.err.find("is empty"), std::string::npos) << outcome.err;
+  }
+}
+
+TEST(AccuracyCurve, CrossesOutWhatTheClosedLoopRefusedAndIsDrawnOverWhatItWasChosenBy) {
+  retarget::AccuracyRow good;
+  good.method = "explicit";
+  good.error_rms_m = good.error_rel_length = good.loop_error_m = 0.005;
+  good.ms_per_sim_s = 10;
+  good.work_ms = 3;
+  retarget::AccuracyRow refused = good;
+  refused.method = "spring";
+  refused.work_ms = 2;
+  refused.loop_error_m = 0.03;
+  refused.is_refused = true;
+  io::AccuracyCurve curve;
+  curve.rows = {good, good};
+  curve.recommended = 0;
+  curve.max_error = 0.01;
+  curve.is_counted = true;
+  EXPECT_EQ(io::accuracy_page(curve).find("refused"), std::string::npos);
+  curve.rows[1] = refused;
+  const std::string page = io::accuracy_page(curve);
+  EXPECT_NE(page.find("<td>refused"), std::string::npos);
+  EXPECT_NE(page.find("over the closed loop too"), std::string::npos);
+  EXPECT_NE(page.find(" 3 ms a second"), std::string::npos);
+  EXPECT_EQ(page.find(" 10 ms a second"), std::string::npos);
+  const auto rows = nlohmann::json::parse(io::accuracy_json(curve))["rows"];
+  EXPECT_EQ(rows[1]["refused"], true);
+  EXPECT_EQ(rows[1]["loop_error_m"], 0.03);
+  EXPECT_EQ(rows[1]["on_front"], false);
+  EXPECT_EQ(rows[0]["on_front"], true);
 }
 
 TEST_F(AccuracyCommands, ExplainTellsEveryEffectOnceWithItsReason) {

@@ -412,6 +412,16 @@ TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
   EXPECT_NE(io::read_file(creature / "report.html").find("What accuracy costs: "), std::string::npos);
 }
 
+/// Springs alone are another body: shorter steps of them do not show what they err by.
+TEST(Convert, HoldsAGivenMethodAgainstAnAccurateOne) {
+  if (kSanitized) GTEST_SKIP() << "minutes with sanitizers";
+  const TemporaryDirectory directory;
+  const Outcome outcome = convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--method spring --max-error 0.3%");
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.err.find("no setting that was tried stays within 0.3 %"), std::string::npos) << outcome.err;
+  EXPECT_GT(report_of(directory.path / "creature")["accuracy"]["estimated_error_length"], 0.005);
+}
+
 /// The nodes of the rows of accuracy.csv, the largest number.
 int most_nodes_tried(const fs::path& creature) {
   std::istringstream lines(io::read_file(creature / "accuracy.csv"));

@@ -45,7 +45,7 @@ std::vector<retarget::EffectRow> of_creature(const EffectsCommand& command, io::
   options.duration_s = command.duration;
   retarget::ScenarioOf<3> scenario = retarget::performed_scenario(performer, creature.signals);
   if (scenario.decisions.empty()) retarget::plan_effects<3>({}, scenario);
-  return retarget::measure_effects(scenario, options);
+  return retarget::measure_effects(performer, scenario, options);
 }
 
 int effects(const EffectsCommand& command) {
@@ -57,10 +57,11 @@ int effects(const EffectsCommand& command) {
   io::write_file(out / "effects.csv", io::effects_csv(rows));
   io::write_file(out / "effects.svg", io::effects_svg(name, rows));
   io::write_file(out / "effects.html", io::effects_page(name, rows));
-  char text[120];
+  char text[160];
   for (const retarget::EffectRow& row : rows) {
-    std::snprintf(text, sizeof text, "%-13s %9.3f ms a second, moves it by %8.3f %% L\n", row.effect.c_str(),
-                  row.ms_per_sim_s, 100 * row.difference_length);
+    std::snprintf(text, sizeof text, "%-13s %9.3f ms a second, moves it by %8.3f %% L; all others: %9.3f ms, %8.3f %% L from all\n",
+                  row.effect.c_str(), row.ms_per_sim_s, 100 * row.difference_length, row.without_ms_per_sim_s,
+                  100 * row.without_difference_length);
     std::cout << text;
   }
   return kDone;

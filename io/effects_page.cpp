@@ -10,7 +10,7 @@ using retarget::EffectRow;
 
 namespace {
 
-constexpr double kWidth = 760, kLabel = 100, kBar = 190, kLine = 24, kTop = 86, kGap = 150;  // [px]
+constexpr double kWidth = 900, kLabel = 100, kBar = 120, kLine = 24, kTop = 116, kGap = 145;  // [px]
 
 std::string bar(double x, double y, double share, const char* colour, const std::string& text) {
   return "<rect x=\"" + short_number(x) + "\" y=\"" + short_number(y) + "\" width=\"" + short_number(std::max(0.0, share) * kBar, 4) +
@@ -25,39 +25,46 @@ std::string guarded(const EffectRow& row) {
 }  // namespace
 
 std::string effects_csv(const std::vector<EffectRow>& rows) {
-  std::string csv = "effect,ms_per_sim_s,difference_length,stable,guard_steps\n";
+  std::string csv = "effect,ms_per_sim_s,difference_length,stable,guard_steps,without_ms_per_sim_s,without_difference_length\n";
   for (const EffectRow& row : rows) {
     csv += row.effect + "," + short_number(row.ms_per_sim_s, 6) + "," + short_number(row.difference_length, 6) +
-           (row.stable ? ",1," : ",0,") + std::to_string(row.guard_steps) + "\n";
+           (row.stable ? ",1," : ",0,") + std::to_string(row.guard_steps) + "," + short_number(row.without_ms_per_sim_s, 6) + "," +
+           short_number(row.without_difference_length, 6) + "\n";
   }
   return csv;
 }
 
 std::string effects_svg(const std::string& subject, const std::vector<EffectRow>& rows) {
-  double most_ms = 1e-12, most_difference = 1e-12;
+  double most_ms = 1e-12, most_alone = 1e-12, most_without = 1e-12;
   for (const EffectRow& row : rows) {
     most_ms = std::max(most_ms, row.ms_per_sim_s);
-    most_difference = std::max(most_difference, row.difference_length);
+    most_alone = std::max(most_alone, row.difference_length);
+    most_without = std::max(most_without, row.without_difference_length);
   }
-  const double height = kTop + kLine * static_cast<double>(rows.size()) + 10;
+  const double height = kTop + kLine * static_cast<double>(rows.size()) + 10, step = kBar + kGap;
+  const auto line = [](double x, double y, const std::string& text) {
+    return "<text x=\"" + short_number(x) + "\" y=\"" + short_number(y) + "\">" + text + "</text>\n";
+  };
   std::string svg =
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + short_number(kWidth) + " " + short_number(height) +
       "\" role=\"img\" font-family=\"sans-serif\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
       "<text x=\"8\" y=\"20\" font-size=\"14\" font-weight=\"bold\">What each effect costs and does: " +
-      escaped(subject) +
-      "</text>\n<text x=\"8\" y=\"38\">Each effect alone, and all together: a long bar on the left that has none on the "
-      "right is time for nothing.</text>\n<text x=\"8\" y=\"53\">Where a body without volume or damping turns elements "
-      "inside out "
-      "the guard steps in, which takes time of its own.</text>\n<text x=\"" +
-      short_number(kLabel) + "\" y=\"76\">processor time [ms for a simulated second]</text><text x=\"" +
-      short_number(kLabel + kBar + kGap) + "\" y=\"76\">motion's difference to none [% of L, RMS]</text>\n";
+      escaped(subject) + "</text>\n" +
+      line(8, 38, "Each effect alone, and all together: time (blue), and how far the motion differs from that without any (orange).") +
+      line(8, 53, "What acts only together with others, as the ground does with weight, shows on the right (green): all but this one, against all.") +
+      line(8, 68, "Without an orange and a green bar an effect changes nothing here. Where a body without volume or damping turns elements") +
+      line(8, 83, "inside out the guard steps in, which takes time of its own.") +
+      line(kLabel, 106, "processor time [ms for a simulated second]") +
+      line(kLabel + step, 106, "alone, to none [% of L, RMS]") +
+      line(kLabel + 2 * step, 106, "left out, to all [% of L, RMS]");
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double y = kTop + kLine * static_cast<double>(k);
-    svg += "<text x=\"" + short_number(kLabel - 6) + "\" y=\"" + short_number(y + 11) + "\" text-anchor=\"end\">" + rows[k].effect +
-           "</text>" +
-           bar(kLabel, y, rows[k].ms_per_sim_s / most_ms, "#1f6fb4", short_number(rows[k].ms_per_sim_s) + guarded(rows[k])) +
-           bar(kLabel + kBar + kGap, y, rows[k].difference_length / most_difference, "#d2691e",
-               short_number(100 * rows[k].difference_length)) +
+    const EffectRow& row = rows[k];
+    svg += "<text x=\"" + short_number(kLabel - 6) + "\" y=\"" + short_number(y + 11) + "\" text-anchor=\"end\">" + row.effect + "</text>" +
+           bar(kLabel, y, row.ms_per_sim_s / most_ms, "#1f6fb4", short_number(row.ms_per_sim_s) + guarded(row)) +
+           bar(kLabel + step, y, row.difference_length / most_alone, "#d2691e", short_number(100 * row.difference_length)) +
+           bar(kLabel + 2 * step, y, row.without_difference_length / most_without, "#2e8b57",
+               short_number(100 * row.without_difference_length)) +
            "\n";
   }
   return svg + "</svg>\n";
@@ -71,10 +78,11 @@ std::string effects_page(const std::string& subject, const std::vector<EffectRow
       ".5em;text-align:right}</style>\n"
       "<h1>Effects of " +
       escaped(subject) + "</h1>\n" + effects_svg(subject, rows) +
-      "<table><tr><th>effect<th>ms a second<th>difference [% L]<th>stable<th>steps by the guard</tr>\n";
+      "<table><tr><th>effect<th>ms a second<th>alone, to none [% L]<th>stable<th>steps by the guard<th>ms a second of all others<th>all others, to all [% L]</tr>\n";
   for (const EffectRow& row : rows) {
     html += "<tr><td>" + row.effect + "<td>" + short_number(row.ms_per_sim_s) + "<td>" + short_number(100 * row.difference_length) +
-            "<td>" + (row.stable ? "yes" : "no") + "<td>" + std::to_string(row.guard_steps) + "</tr>\n";
+            "<td>" + (row.stable ? "yes" : "no") + "<td>" + std::to_string(row.guard_steps) + "<td>" + short_number(row.without_ms_per_sim_s) +
+            "<td>" + short_number(100 * row.without_difference_length) + "</tr>\n";
   }
   return html + "</table>\n</html>\n";
 }

@@ -20,19 +20,20 @@ inline double median(std::array<double, kTimings> values) {
   return values[kTimings / 2];
 }
 
-/// Seconds of one call of `work`: the median of timings of many calls each.
+/// Seconds of one call of `work`: the median of timings of many calls each. The clock is asked before and after all of a timing's
+/// calls, for asking it may take longer than one of them.
 template <typename Work>
 double seconds_of(const Work& work) {
   constexpr double kPassSeconds = 0.003;  // of one timing, at least
   std::array<double, kTimings> all;
+  long calls = 1;
   for (double& seconds : all) {
-    const double began = thread_seconds();
-    long calls = 0;
-    do {
-      work();
-      ++calls;
+    for (;; calls *= 2) {
+      const double began = thread_seconds();
+      for (long k = 0; k < calls; ++k) work();
       seconds = thread_seconds() - began;
-    } while (seconds < kPassSeconds);
+      if (seconds >= kPassSeconds) break;
+    }
     seconds /= static_cast<double>(calls);
   }
   return median(all);

@@ -42,7 +42,7 @@ class Planner {
     const bool rubs = scene_.ground.friction > 0 || std::any_of(scene_.obstacles.begin(), scene_.obstacles.end(),
                                                                 [](const auto& o) { return o.friction > 0; });
     const bool touches = is_on("ground") || is_on("obstacles");
-    decide("friction", touches, touches && rubs, "what the body touches rubs",
+    decide("friction", touches && rubs, touches && rubs, "what the body touches rubs",
            touches ? "nothing rubs" : "there is nothing to rub against");
     if (!is_on("friction")) {
       scene_.ground.friction = 0;

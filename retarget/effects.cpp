@@ -7,14 +7,13 @@
 #include "physics/elastic_forces.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/performed_scenario.h"
+#include "retarget/picture_effects.h"
 #include "retarget/simulation.h"
-#include "retarget/wobble_plan.h"
 
 namespace hydrostat::retarget {
 namespace {
 
 constexpr int kContactSteps = 24;       // of one timing of the ground
-constexpr double kFramesPerSecond = 60;  // at which the skin is asked for
 
 physics::Body without_volume(const physics::Body& body) {
   physics::Body springs = body;
@@ -57,15 +56,13 @@ double self_contact_seconds(const physics::Scene& scene, const physics::State& s
   return seconds_between(scene, without, start, options);
 }
 
-EffectReport embedding_of(const Performer& performer, const physics::State& state) {
+EffectReport embedding_of(const Performer& performer) {
   return {"embedding", "on", "the skin follows the nodes of its tets; counted at 60 frames a second, outside the solver",
-          1e3 * seconds_of([&] { embedded_positions(performer.embedding, state.x); }) * kFramesPerSecond};
+          embedding_ms_per_sim_s(performer)};
 }
 
 EffectReport wobble_of(const Performer& performer) {
-  const bool wobbles = performer.wobble.is_on();
-  return {"wobble", wobbles ? "on" : "off", performer.wobble.reason,
-          wobbles ? 1e3 * wobble_seconds(performer) * performer.prepared.target.rate_hz : 0};
+  return {"wobble", performer.wobble.is_on() ? "on" : "off", performer.wobble.reason, wobble_ms_per_sim_s(performer)};
 }
 
 /// Of a creature in a scene: what that decided, timed as a scene's effects are.
@@ -77,7 +74,7 @@ std::vector<EffectReport> effects_in_world(const Performer& performer, const Rep
   simulation.dt_s = options.step_s;
   std::vector<EffectReport> effects = effects_of(scenario, simulation);
   for (EffectReport& effect : effects) {
-    if (effect.name == "embedding") effect = embedding_of(performer, scenario.start);
+    if (effect.name == "embedding") effect = embedding_of(performer);
     if (effect.name == "wobble") effect = wobble_of(performer);
     if (effect.name == "fracture") effect.reason = "a creature has no seams; scenes have [[seam]]";
     if (effect.name == "pushes" && !options.pushes.empty()) effect.reason = "asked for by --push";
@@ -125,7 +122,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
       {"air_drag", "off", "a creature moves in still air without drag; scenes have [air]", 0},
       {"water", "off", "there is no water", 0},
       {"pushes", pushed ? "on" : "off", pushed ? "asked for by --push" : "none was asked for", ms(pushing * passes)},
-      embedding_of(performer, state),
+      embedding_of(performer),
       wobble_of(performer),
       {"fracture", "off", "a creature has no seams; scenes have [[seam]]", 0},
   };

@@ -192,7 +192,7 @@ TEST_F(Replay, GoesInTheSceneThatTheCreatureWasMadeWith) {
   EXPECT_NE(told.out.find("water         on"), std::string::npos) << told.out;
   EXPECT_EQ(hydrostat_in(directory_.path, "bench effects creature -o bench --duration 0.1").exit_code, 0);
   const std::string rows = io::read_file(directory_.path / "bench" / "effects.csv");
-  for (const char* row : {"\nnone,", "\nobstacles,", "\nwater,", "\nair_drag,", "\npushes,", "\nall,"}) {
+  for (const char* row : {"\nnone,", "\nobstacles,", "\nwater,", "\nair_drag,", "\npushes,", "\nembedding,", "\nall,"}) {
     EXPECT_NE(rows.find(row), std::string::npos) << row << rows;
   }
   io::write_file(directory_.path / "bad.toml", "[body]\nshape = \"cube\"\n");

@@ -2,9 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "retarget/effect_bench.h"
+#include "retarget/effect_plan.h"
+#include "retarget/performed_scenario.h"
+#include "retarget/picture_effects.h"
 #include "retarget/wobble_plan.h"
 #include "tests/retarget/shapes.h"
 
@@ -258,6 +263,31 @@ TEST(PlanWobble, DoesAsItIsAsked) {
   const Barrel asked = bobbing(0.002, Wish::kOn);
   EXPECT_TRUE(asked.performer.wobble.is_on());
   EXPECT_EQ(asked.performer.wobble.reason.substr(0, 9), "asked for");
+}
+
+/// The body moves the same; what wobble does is seen on the skin alone.
+TEST(MeasureEffects, OfACreatureHaveWobbleAndEmbeddingOnItsSkin) {
+  Performer performer = shaken().performer;
+  ScenarioOf<3> scenario = undriven_scenario(performer);
+  plan_effects<3>({}, scenario);
+  SimulationOptions options;
+  options.duration_s = 0.1;
+  const auto row = [&](const std::vector<EffectRow>& rows, const std::string& name) {
+    const auto found = std::find_if(rows.begin(), rows.end(), [&](const EffectRow& one) { return one.effect == name; });
+    return found == rows.end() ? EffectRow{} : *found;
+  };
+  const std::vector<EffectRow> rows = measure_effects(performer, scenario, options);
+  const EffectRow wobble = row(rows, "wobble"), embedding = row(rows, "embedding");
+  EXPECT_GT(wobble.difference_length, 1e-5);
+  EXPECT_GT(wobble.without_difference_length, 1e-5);
+  EXPECT_GT(wobble.ms_per_sim_s, rows.front().ms_per_sim_s);
+  EXPECT_GT(embedding.difference_length, 0);
+  EXPECT_GT(row(rows, "gravity").without_difference_length, 1e-3);
+  const Motion all = simulate(scenario, options).motion;
+  const Eigen::MatrixXd offsets = wobbled_motion(performer, all) - embedded_motion(performer, all);
+  EXPECT_NEAR(wobble.without_difference_length, std::sqrt(3 * offsets.squaredNorm() / static_cast<double>(offsets.size())) / performer.length, 1e-12);
+  performer.wobble = {};
+  EXPECT_EQ(row(measure_effects(performer, scenario, options), "wobble").effect, "");
 }
 
 TEST(WobbleMorphs, AreTheModesWithTheirAmplitudes) {

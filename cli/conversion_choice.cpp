@@ -75,11 +75,18 @@ void Conversion::choose_nodes(const io::ImportedCharacter& imported, double wish
     if (!coarser || coarser->creature_.mesh.node_count() == last) continue;
     last = coarser->creature_.mesh.node_count();
     if (last >= own) return;
-    if (take_mesh(*coarser, wished, chosen_->setting, chosen_->harmonics)) return;
-    // The error that a cheap method and few harmonics use up may be what this mesh needs.
+    // The error that a cheap method and few harmonics use up may be what this mesh needs; nor need that method be cheap on it.
     const retarget::StepSetting accurate{physics::Method::kExplicit, kControlSeconds};
-    const bool is_other = chosen_->setting.method != accurate.method || chosen_->harmonics > 0;
-    if (options_.method == "auto" && is_other && take_mesh(*coarser, wished, accurate, 0)) return;
+    const auto take_accurate = [&] { return take_mesh(*coarser, wished, accurate, 0); };
+    const auto work_of = [&](const retarget::StepSetting& setting) {
+      return retarget::measure_level(*chosen_->reference, coarser->target_.performer, coarser->signals_, setting).work_ms;
+    };
+    const bool is_method_other = chosen_->setting.method != accurate.method;
+    const bool may_be_accurate = options_.method == "auto" && (is_method_other || chosen_->harmonics > 0);
+    const bool is_accurate_first = may_be_accurate && is_method_other && work_of(accurate) < work_of(chosen_->setting);
+    if (is_accurate_first && take_accurate()) return;
+    if (take_mesh(*coarser, wished, chosen_->setting, chosen_->harmonics)) return;
+    if (may_be_accurate && !is_accurate_first && take_accurate()) return;
   }
 }
 

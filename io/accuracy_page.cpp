@@ -80,16 +80,16 @@ std::string grid(const Axis& x, const Axis& y, bool is_counted) {
 std::string sentence(const AccuracyCurve& curve) {
   if (curve.recommended < 0) return "No setting stays within " + percent(curve.max_error) + " of L.";
   const AccuracyRow& row = curve.rows[static_cast<std::size_t>(curve.recommended)];
-  const std::string loop = row.loop_error_m >= 0 ? " over the closed loop too" : "";
+  const std::string loop = row.loop_error_m >= 0 ? ", closed loop too" : "";
   return "Ringed: the least work within " + percent(curve.max_error) + " of L" + loop + ": " + name_of(row) + ".";
 }
 
 std::string second_sentence(const AccuracyCurve& curve) {
-  std::string text = "Down and to the left is better; the line joins what nothing beats in both.";
+  std::string text = "Down and to the left is better; the line joins what nothing beats in both";
   if (std::any_of(curve.rows.begin(), curve.rows.end(), [](const AccuracyRow& row) { return row.is_refused; })) {
-    text += " Crossed: refused, for the whole walk fell or strayed.";
+    text += "; crossed: the whole walk refused it";
   }
-  return text;
+  return text + ".";
 }
 
 /// A cross over a point of what was refused.

@@ -131,7 +131,7 @@ TEST(AccuracyCurve, CrossesOutWhatTheClosedLoopRefusedAndIsDrawnOverWhatItWasCho
   curve.rows[1] = refused;
   const std::string page = io::accuracy_page(curve);
   EXPECT_NE(page.find("<td>refused"), std::string::npos);
-  EXPECT_NE(page.find("over the closed loop too"), std::string::npos);
+  EXPECT_NE(page.find("of L, closed loop too"), std::string::npos);
   EXPECT_NE(page.find(" 3 ms a second"), std::string::npos);
   EXPECT_EQ(page.find(" 10 ms a second"), std::string::npos);
   const auto rows = nlohmann::json::parse(io::accuracy_json(curve))["rows"];

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kApart = 3;     // widths [-] between the middles of parts that do not meet yet
 constexpr double kSwing = 2;     // of L [m]: how far the middle of a clamped body sinks, at most
+constexpr double kTouch = 1e-6;   // of L [m]: how deep a body may start in what it touches
 constexpr double kForEver = 1e299;  // [s]: a clamp that lets go then never does
 
 template <int Dim>
@@ -37,10 +38,25 @@ double energy_given(const ScenarioOf<Dim>& scenario, double duration_s) {
   return mass / 2 * speed * speed;
 }
 
+/// Nothing pushes it out of what it starts in.
+template <int Dim>
+bool stands_clear(const ScenarioOf<Dim>& scenario) {
+  const physics::SceneOf<Dim>& scene = scenario.scene;
+  const double least = -kTouch * scenario.length;
+  if (scene.has_ground && (scene.ground.normal.transpose() * scenario.start.x).minCoeff() - scene.ground.offset < least) return false;
+  for (const physics::ObstacleOf<Dim>& obstacle : scene.obstacles) {
+    for (const auto node : scenario.start.x.colwise()) {
+      physics::VectorOf<Dim> normal;
+      if (physics::signed_distance<Dim>(obstacle, physics::VectorOf<Dim>::Zero(), node, normal) < least) return false;
+    }
+  }
+  return true;
+}
+
 template <int Dim>
 bool is_bounded(const ScenarioOf<Dim>& scenario) {
   const auto flows = [](const auto& fluid) { return fluid && fluid->velocity.norm() > 0; };
-  return scenario.waves.empty() && !scenario.drive && scenario.moves.empty() && !flows(scenario.scene.water) &&
+  return stands_clear(scenario) && scenario.waves.empty() && !scenario.drive && scenario.moves.empty() && !flows(scenario.scene.water) &&
          !flows(scenario.scene.air) && !(scenario.scene.water && scenario.scene.gravity.norm() > 0);
 }
 

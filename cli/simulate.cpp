@@ -65,14 +65,14 @@ retarget::SimulationOptions options_of(const SimulateCommand& command, const io:
 
 /// What command line and scene file say together.
 io::SceneFile read_scene(const SimulateCommand& command) {
-  io::SceneFile scene =
-      io::read_scene_file(command.scene, command.seed_is_given ? std::optional(command.seed) : std::nullopt);
+  const auto given = [](bool is_given, auto value) { return is_given ? std::optional(value) : std::nullopt; };
+  io::SceneFile scene = io::read_scene_file(command.scene, given(command.seed_is_given, command.seed), std::nullopt, "",
+                                            given(command.duration > 0, command.duration));
   if (!command.method.empty()) {
     const std::optional<physics::Method> method = io::method_named(command.method);
     if (method) scene.method = *method;
     scene.method_is_auto = !method;
   }
-  if (command.duration > 0) scene.duration_s = command.duration;
   return scene;
 }
 

@@ -227,7 +227,7 @@ std::string accuracy_page(const AccuracyCurve& curve) {
       "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Accuracy against "
       "time</title>\n<style>body{font:14px "
       "sans-serif;max-width:1180px;margin:2em auto;padding:0 "
-      "1em}svg{width:900px;max-width:100%}table{border-collapse:collapse}"
+      "1em}svg{width:900px;max-width:100%}table{border-collapse:collapse;display:block;overflow-x:auto}"
       "th,td{border:1px solid #ccc;padding:.25em "
       ".5em;text-align:right}tr:target{background:#fe9}.chosen{font-weight:bold}a{cursor:"
       "pointer}</style>\n<h1>Accuracy against time: " +

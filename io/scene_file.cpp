@@ -24,6 +24,7 @@ using retarget::StartShape;
 constexpr double kMostActivation = 0.95;     // of all waves on one constraint: 1 would let it vanish
 constexpr double kLeastPoissonsRatio = 0.25; // of springs
 constexpr double kFriction = 0.8;
+constexpr double kFull = 1 - 1e-6;           // of its box, from which a body is one
 constexpr double kOrigins = 64;              // [m] between the places that may be the local origin
 const std::string kSprings = "springs";
 const std::vector<std::string> kLaws{kSprings, "stable_neo_hookean", "corotated_linear"};
@@ -226,12 +227,22 @@ class SceneReader {
     physics::SceneOf<Dim>& scene = scenario_.scene;
     auto [wishes, friction] =
         read_wished_effects(root_, retarget::switchable_effects(), scene.has_ground ? scene.ground.friction : kFriction);
-    const std::string broken = retarget::plan_effects<Dim>(wishes, scenario_);
+    const std::string broken = retarget::plan_effects<Dim>(wishes, scenario_, scene_.duration_s);
     if (!broken.empty()) throw root_.refusal("effects", broken, "Add what it needs, or leave the effect to 'auto'.");
-    retarget::SelfContactPlan plan = retarget::plan_self_contact<Dim>(scenario_, start, wishes["self_contact"], friction);
+    retarget::SelfContactPlan plan = retarget::plan_self_contact<Dim>(scenario_, start, wishes["self_contact"], friction, bar(), scene_.duration_s);
     retarget::plan_parts_contact<Dim>(start, wishes["self_contact"], friction, scenario_, plan);
     scene.self_contact = std::move(plan.settings);
     scenario_.self_contact_reason = std::move(plan.reason);
+  }
+
+  /// What the body is where it fills its own box.
+  retarget::Bar bar() const {
+    VectorOf<Dim> extent = mesh_.rest.rowwise().maxCoeff() - mesh_.rest.rowwise().minCoeff();
+    if (scenario_.scene.body.rest_volume.sum() < kFull * extent.prod()) return {};
+    std::sort(extent.begin(), extent.end());
+    retarget::Bar bar{extent[Dim - 1], extent[0], extent[Dim - 2], mesh_.materials.front().youngs_modulus};
+    for (const physics::ElementMaterial& material : mesh_.materials) bar.softest = std::min(bar.softest, material.youngs_modulus);
+    return bar;
   }
 
   /// [1/s]
@@ -274,7 +285,7 @@ std::optional<physics::Method> method_named(const std::string& name) {
 }
 
 SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed, std::optional<int> nodes,
-                          const std::string& element) {
+                          const std::string& element, std::optional<double> duration_s) {
   toml::table table = parse_toml(file);
   if (toml::table* const body = table["body"].as_table(); body != nullptr && nodes) {
     body->erase("cell_size_m");
@@ -294,6 +305,7 @@ SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsig
   scene.sha256 = file_sha256(file);
   scene.dt_s = root.number_or("dt_s", scene.dt_s, {.least = 1e-5, .most = 0.2});
   scene.duration_s = root.number_or("duration_s", scene.duration_s, {.least = 1e-3, .most = 3600});
+  if (duration_s) scene.duration_s = *duration_s;
   scene.seed = static_cast<unsigned>(root.whole_or("seed", 0, 0, 4294967295L));
   if (seed) scene.seed = *seed;
   if (root.whole_or("dimension", 3, 2, 3) == 3) {

@@ -30,10 +30,11 @@ std::vector<std::string> method_names();
 /// "auto" is nothing.
 std::optional<physics::Method> method_named(const std::string& name);
 
-/// Reads SCENE.toml (README, "Scene files"); `seed`, `nodes`, the wished number, and `element` are taken for the file's own where given.
+/// Reads SCENE.toml (README, "Scene files"); `seed`, `nodes`, the wished number, `element` and `duration_s` are taken for the file's own where given.
 /// Files that it names lie relative to it. Throws Error with the line for what is not TOML, a key that is not known (with the nearest that is), a wrong type or range,
 /// a surface that is not closed, a mesh with slivers, a region that holds nothing, activations that could reach 0.
 SceneFile read_scene_file(const std::filesystem::path& file, std::optional<unsigned> seed = std::nullopt,
-                          std::optional<int> nodes = std::nullopt, const std::string& element = "");
+                          std::optional<int> nodes = std::nullopt, const std::string& element = "",
+                          std::optional<double> duration_s = std::nullopt);
 
 }  // namespace hydrostat::io

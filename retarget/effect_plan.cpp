@@ -4,12 +4,13 @@
 #include <cmath>
 #include <cstdio>
 
+#include "retarget/reach.h"
+
 namespace hydrostat::retarget {
 namespace {
 
 using physics::VectorOf;
 
-constexpr double kExtent = 2;  // of L [-]: no part of a body that nothing holds is farther from its centre of mass
 constexpr double kLeastResistance = 0.005;  // of the weight [-]: less is not seen
 constexpr double kLeastSpeed = 1e-9;        // beside that of the whole body, over it [-]: less is rounding
 constexpr double kGravity = 9.81;           // [m/s2] of the weight where there is none
@@ -26,10 +27,11 @@ std::string many(std::size_t count, const char* one) { return std::to_string(cou
 template <int Dim>
 class Planner {
  public:
-  Planner(const std::map<std::string, Wish>& wishes, ScenarioOf<Dim>& scenario)
+  Planner(const std::map<std::string, Wish>& wishes, ScenarioOf<Dim>& scenario, double duration_s)
       : wishes_(wishes),
         scenario_(scenario),
         scene_(scenario.scene),
+        duration_s_(duration_s),
         centre_(physics::centre_of_mass(scene_.body, scenario.start.x)),
         velocity_(physics::momentum(scene_.body, scenario.start.v) / scene_.body.mass.sum()) {}
 
@@ -37,6 +39,7 @@ class Planner {
     const bool has_gravity = scene_.gravity.norm() > 0;
     decide("gravity", has_gravity, has_gravity, number(scene_.gravity.norm(), 3) + " m/s2", "the scene has none");
     if (!is_on("gravity")) scene_.gravity.setZero();
+    reach_ = reach_of(scenario_, duration_s_);
     decide_surroundings();
     decide_fluids();
     const bool rubs = scene_.ground.friction > 0 || std::any_of(scene_.obstacles.begin(), scene_.obstacles.end(),
@@ -49,9 +52,7 @@ class Planner {
       for (auto& obstacle : scene_.obstacles) obstacle.friction = 0;
     }
     decide_body();
-    decide("pushes", !scenario_.pushes.empty(), !scenario_.pushes.empty(),
-           std::to_string(scenario_.pushes.size()) + " in the scene", "the scene has none");
-    if (!is_on("pushes")) scenario_.pushes.clear();
+    decide_pushes();
     decide_fracture();
     return broken_;
   }
@@ -86,30 +87,27 @@ class Planner {
     scenario_.decisions.push_back(std::move(decision));
   }
 
-  /// Something other than the body's own weight and speed may bring it anywhere.
-  bool is_led() const { return !scenario_.clamps.empty() || !scenario_.pushes.empty() || scene_.water || scene_.air; }
+  std::string unreached() const {
+    return duration_s_ < kUnending ? "the body cannot come there within " + number(duration_s_, 4) + " s" : "nothing can bring the body there";
+  }
 
-  /// Whether the body, in free flight for ever, comes to where normal . x is below offset.
-  bool can_sink_below(const VectorOf<Dim>& normal, double offset) const {
-    if (is_led()) return true;
-    const double height = normal.dot(centre_) - offset - kExtent * scenario_.length, speed = normal.dot(velocity_),
-                 pull = normal.dot(scene_.gravity);
-    if (height <= 0 || pull < 0 || (pull == 0 && speed < 0)) return true;
-    return pull > 0 && speed < 0 && speed * speed / (2 * pull) >= height;  // where it turns around
+  void decide_pushes() {
+    double first_s = kUnending;
+    for (const PushOf<Dim>& push : scenario_.pushes) first_s = std::min(first_s, push.time_s);
+    const bool has_any = !scenario_.pushes.empty();
+    decide("pushes", has_any, has_any && first_s < duration_s_, std::to_string(scenario_.pushes.size()) + " in the scene",
+           has_any ? "the first begins at " + number(first_s, 4) + " s, and the end is at " + number(duration_s_, 4) + " s"
+                   : "the scene has none");
+    if (!is_on("pushes")) scenario_.pushes.clear();
   }
 
   void decide_surroundings() {
-    const bool reached = scene_.has_ground && can_sink_below(scene_.ground.normal, scene_.ground.offset);
-    decide("ground", scene_.has_ground, reached, "the body stands, lands or can land on it",
-           scene_.has_ground ? "nothing can bring the body there" : "the scene has none");
+    decide("ground", scene_.has_ground, scene_.has_ground && reach_.ground, "the body stands, lands or can land on it",
+           scene_.has_ground ? unreached() : "the scene has none");
     scene_.has_ground = is_on("ground");
     const bool has_any = !scene_.obstacles.empty();
-    bool near = is_led() || !scenario_.moves.empty() || scene_.gravity.norm() > 0 || velocity_.norm() > 0;
-    for (const physics::ObstacleOf<Dim>& obstacle : scene_.obstacles) {
-      near = near || physics::distance_at_least<Dim>(obstacle, VectorOf<Dim>::Zero(), centre_) <= kExtent * scenario_.length;
-    }
-    decide("obstacles", has_any, has_any && near, many(scene_.obstacles.size(), "obstacle") + " in the scene",
-           has_any ? "nothing can bring the body there" : "the scene has none");
+    decide("obstacles", has_any, has_any && reach_.obstacles, many(scene_.obstacles.size(), "obstacle") + " in the scene",
+           has_any ? unreached() : "the scene has none");
     if (!is_on("obstacles")) {
       scene_.obstacles.clear();
       scenario_.moves.clear();
@@ -123,9 +121,9 @@ class Planner {
     if (scene_.water && std::isfinite(scene_.water->level)) {
       const bool is_wet = scenario_.start.x.row(1).minCoeff() < scene_.water->level;
       const bool falls = scene_.gravity.norm() > 0 || velocity_.norm() > 0 || !scenario_.pushes.empty();
-      reached = is_wet || falls;
+      reached = is_wet || (falls && reach_.water);
       why = is_wet ? "the body starts in it" : "the body can fall into it";
-      why_not = "nothing can bring the body to its surface";
+      why_not = falls ? unreached() : "nothing can bring the body to its surface";
     }
     decide("water", scene_.water.has_value(), reached, why, why_not);
     if (!is_on("water")) scene_.water.reset();
@@ -200,7 +198,9 @@ class Planner {
   const std::map<std::string, Wish>& wishes_;
   ScenarioOf<Dim>& scenario_;
   physics::SceneOf<Dim>& scene_;
+  const double duration_s_;
   const VectorOf<Dim> centre_, velocity_;
+  Reach reach_;
   std::string broken_;
 };
 
@@ -213,11 +213,11 @@ const std::vector<std::string>& switchable_effects() {
 }
 
 template <int Dim>
-std::string plan_effects(const std::map<std::string, Wish>& wishes, ScenarioOf<Dim>& scenario) {
+std::string plan_effects(const std::map<std::string, Wish>& wishes, ScenarioOf<Dim>& scenario, double duration_s) {
   scenario.decisions.clear();
-  return Planner<Dim>(wishes, scenario).plan();
+  return Planner<Dim>(wishes, scenario, duration_s).plan();
 }
-template std::string plan_effects<2>(const std::map<std::string, Wish>&, ScenarioOf<2>&);
-template std::string plan_effects<3>(const std::map<std::string, Wish>&, ScenarioOf<3>&);
+template std::string plan_effects<2>(const std::map<std::string, Wish>&, ScenarioOf<2>&, double);
+template std::string plan_effects<3>(const std::map<std::string, Wish>&, ScenarioOf<3>&, double);
 
 }  // namespace hydrostat::retarget

@@ -17,6 +17,7 @@ constexpr double kTargetCells = 1;   // parts of a creature that its target brin
 constexpr double kFarCells = 4;   // parts of a creature that are nearer in the bind pose never touch
 constexpr double kDetour = 3;     // way along the body over the gap [-] from which parts are far from each other
 constexpr double kRing = 2 * std::numbers::pi;  // length over width of a bar that as a ring is strained by 1
+constexpr double kMuchEnergy = 4;  // of what it takes [-]: methods of few iterations are softer than the material
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 template <typename... Numbers>
@@ -98,7 +99,8 @@ bool has_near_parts(const physics::SceneOf<Dim>& scene, double cell) {
 }  // namespace
 
 template <int Dim>
-SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape start, Wish wish, double friction) {
+SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape start, Wish wish, double friction, const Bar& bar,
+                                  double duration_s) {
   const physics::SceneOf<Dim>& scene = scenario.scene;
   const physics::BodyOf<Dim>& body = scene.body;
   const auto plan = [&](bool is_on, std::string reason) { return chosen<Dim>(is_on, friction, std::move(reason)); };
@@ -114,8 +116,13 @@ SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape st
   ways.maxCoeff(&end);
   const double length = ways_from(body, static_cast<int>(end)).maxCoeff(), section = body.rest_volume.sum() / length;
   const double slenderness = length / (Dim == 3 ? std::sqrt(section) : section);
-  if (slenderness >= kRing)
+  if (slenderness >= kRing) {
+    const double energies = energies_to_fold(scenario, bar, duration_s);
+    if (energies > kMuchEnergy && std::isfinite(energies))
+      return plan(false, sentence("to fold this bar takes %.0f times the energy that fall, speed and pushes can give it", energies));
+    if (energies > kMuchEnergy) return plan(false, "nothing gives this bar energy to fold");
     return plan(true, sentence("the body is %.1f times as long as wide and may come round to itself", slenderness));
+  }
   if (has_near_parts(scene, body.rest_length.mean())) {
     return plan(true, "parts that are far from each other along the body stand within two cells");
   }
@@ -194,7 +201,7 @@ SelfContactPlan plan_self_contact(const Performer& performer) {
 
 template void plan_parts_contact<2>(StartShape, Wish, double, ScenarioOf<2>&, SelfContactPlan&);
 template void plan_parts_contact<3>(StartShape, Wish, double, ScenarioOf<3>&, SelfContactPlan&);
-template SelfContactPlan plan_self_contact<2>(const ScenarioOf<2>&, StartShape, Wish, double);
-template SelfContactPlan plan_self_contact<3>(const ScenarioOf<3>&, StartShape, Wish, double);
+template SelfContactPlan plan_self_contact<2>(const ScenarioOf<2>&, StartShape, Wish, double, const Bar&, double);
+template SelfContactPlan plan_self_contact<3>(const ScenarioOf<3>&, StartShape, Wish, double, const Bar&, double);
 
 }  // namespace hydrostat::retarget

@@ -1,7 +1,8 @@
 // The tables of README that are measured, from what the program and the benchmarks wrote; samples/figures.sh calls it.
-//   node figures.mjs levels|chosen|peers|damping|import KEPT.csv README.md [MEASURED...]
+//   node figures.mjs levels|chosen|polish|peers|damping|import KEPT.csv README.md [MEASURED...]
 // KEPT.csv holds what the table shows. Measured rows take the place of those of the same creature, solver, body or file; without
-// any the table is written from what is kept. MEASURED: reports NAME.LEVEL.json of 'hydrostat replay --json', creatures (for 'chosen'), or CSV files.
+// any the table is written from what is kept. MEASURED: reports NAME.LEVEL.json of 'hydrostat replay --json', creatures (for 'chosen'),
+// directories with a creature 'on' and one 'off' (for 'polish'), or CSV files.
 //   node figures.mjs speed KEPT.txt README.md [PRINTED.txt]
 // 'levels' draws its picture beside KEPT.csv, too.
 import {existsSync, readFileSync, renameSync, writeFileSync} from 'node:fs';
@@ -37,6 +38,8 @@ function merged(kept, fresh, key_of) {
 }
 
 const short = (value, digits) => (value >= 10 ** digits ? `${Math.round(value)}` : `${Number(value.toPrecision(digits))}`);
+/** Two digits without a power of ten; 0 below a billionth. */
+const plain = (value) => Number(value).toFixed(Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(Math.max(1e-9, value)))))).replace(/(\.\d*[1-9])0+$|\.0+$/, '$1');
 const as_power = (value) => value.toExponential(1).replace(/e([+-])(\d)$/, 'e$10$2').replace('e+0', 'e').replace('e+', 'e');
 const line = (cells) => `|${cells.map((cell) => (cell === '' ? ' ' : ` ${cell} `)).join('|')}|`;
 const markdown = (head, rows) => [head, head.map(() => '---'), ...rows].map(line).join('\n');
@@ -97,6 +100,29 @@ function peers_table(rows) {
       short(Number(row.cpu_ms_per_s), 3), Number(row.times_of_bullet_60).toFixed(3), as_power(Number(row.rms_error_m)), lost(row)]));
 }
 
+/** A row from a creature that was converted with polish ('on') and without ('off'), in a directory named as the row. */
+function polish_row(directory) {
+  const [off, on] = ['off', 'on'].map((way) => JSON.parse(readFileSync(join(directory, way, 'report.json'), 'utf8')));
+  const round = (value) => Number(value.toPrecision(3));
+  const open_loop = (report) => {
+    const {fell, fall_time_s, duration_s} = report.replay.open_loop;
+    return [round(fell ? fall_time_s : duration_s), fell ? 1 : 0];
+  };
+  const [before_s, falls_before] = open_loop(off), [after_s, falls_after] = open_loop(on);
+  return {
+    creature: basename(directory), correction_before: round(off.replay.closed_loop.correction_rms), correction_after: round(on.replay.closed_loop.correction_rms),
+    open_loop_s_before: before_s, falls_before, open_loop_s_after: after_s, falls_after,
+    shape_before: round(off.replay.closed_loop.shape_rms_length), shape_after: round(on.replay.closed_loop.shape_rms_length),
+  };
+}
+function polish_table(rows) {
+  const named = (creature) => creature.replace(/^\S+/, '`$&`').replace(/ (.+)/, ' `$1`');
+  const lasted = (seconds, falls) => `${short(Number(seconds), 2)} s${Number(falls) ? '' : ' (all)'}`;
+  return markdown(['`--polish on`', 'correction before', 'after', 'open loop stays up, before', 'after', 'shape before, % L', 'after'],
+    rows.map((row) => [named(row.creature), plain(row.correction_before), plain(row.correction_after), lasted(row.open_loop_s_before, row.falls_before),
+      lasted(row.open_loop_s_after, row.falls_after), (100 * row.shape_before).toFixed(2), (100 * row.shape_after).toFixed(2)]));
+}
+
 /** The Young's modulus from which on implicit is cheaper, between the two measured ones where the ratio of the times passes 1. */
 function crossing(rows) {
   const points = rows.map((row) => [Number(row.youngs_modulus_pa), row.explicit_ms_per_s / row.implicit_ms_per_s]);
@@ -130,6 +156,11 @@ const kinds = {
       'finest_ms_per_sim_s', 'falls', 'way'],
     read: (creatures) => creatures.map(chosen_row), key: (row) => row.creature, table: chosen_table,
   },
+  polish: {
+    columns: ['creature', 'correction_before', 'correction_after', 'open_loop_s_before', 'falls_before', 'open_loop_s_after', 'falls_after',
+      'shape_before', 'shape_after'],
+    read: (directories) => directories.map(polish_row), key: (row) => row.creature, table: polish_table,
+  },
   peers: {
     columns: ['scene', 'tets', 'solver', 'steps_per_s', 'cpu_ms_per_s', 'times_of_bullet_60', 'rms_error_m', 'angular_loss'],
     read: (files) => files.flatMap(read_csv).filter((row) => row.cpu_ms_per_s !== ''), table: peers_table,
@@ -159,6 +190,6 @@ if (kind === 'speed') {
   write_between_marks(readme, `samples/figures.sh ${kind}`, table(rows));
   if (kind === 'levels') write_whole(kept_file.replace(/csv$/, 'svg'), levels_svg(rows));
 } else {
-  console.error(`figures.mjs: '${kind}' is no table. Name levels, chosen, peers, damping, import or speed.`);
+  console.error(`figures.mjs: '${kind}' is no table. Name levels, chosen, polish, peers, damping, import or speed.`);
   process.exit(2);
 }

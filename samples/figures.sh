@@ -3,14 +3,15 @@
 #   scenes    pictures of the scenes' accuracy and effects                          minutes
 #   creature  the trot's own curve of accuracy                                      a quarter of an hour
 #   chosen    what convert --max-error 2% chooses for worm, trot and fox  ten minutes
+#   polish    what convert --polish on does (clips that are not ours as above)                  half an hour
 #   levels    levels of detail, table and picture (clips that are not ours from HYDROSTAT_ASSETS, where they are there)  an hour
 #   speed     what the stages of a conversion cost                                  minutes
 #   import    what reading the samples costs                                        seconds
 #   damping   explicit against implicit over damping and stiffness (installs what tests/bench/run.sh wants)   a quarter of an hour
 #   peers     our methods against Bullet's (the same)                               a quarter of an hour
-#   stability the suite of hard scenes: hours, and therefore only where it is named
+#   stability the suite of hard scenes; runs that are there are not run again                  hours
 #   draw      tables and pictures from what was measured before (samples/figures/*.csv): seconds, also only where named
-# Without WHAT all but the last two. HYDROSTAT names another program than build/release/hydrostat, which is built where it is not
+# Without WHAT all but the last. HYDROSTAT names another program than build/release/hydrostat, which is built where it is not
 # there. Times are this machine's. What is measured goes to out/figures/; a creature that is there is not converted again.
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")
@@ -79,6 +80,26 @@ run_chosen() {
   choose fox "$assets/gltf/fox.glb" --clip Walk --height 0.6
   table chosen csv "${creatures[@]}"
 }
+run_polish() {
+  local creatures=()
+  polish() {  # NAME CLIP OPTION...: converted with it and without
+    if [ ! -f "$2" ]; then
+      echo "figures.sh: $2: is not there. The row of '$1' stays as it is."
+      return
+    fi
+    local way
+    for way in off on; do
+      "$hydrostat" convert "$2" -o "$out/polish/$1/$way" --polish "$way" --quiet "${@:3}" || [ $? = 3 ]
+    done
+    creatures+=("$out/polish/$1")
+  }
+  polish boxdog_trot "$project/samples/boxdog_trot.fbx"
+  polish 'boxdog_trot --nodes 40' "$project/samples/boxdog_trot.fbx" --nodes 40
+  polish 'fox --height 0.6' "$assets/gltf/fox.glb" --clip Walk --height 0.6
+  polish slime "$assets/fbx/slime.fbx" --clip Slime_Walk
+  polish spider "$assets/gltf/spider_animated.gltf" --from 1.375 --to 2.125 --height 0.3
+  table polish csv "${creatures[@]}"
+}
 run_levels() {
   mkdir -p -- "$out/reports"
   reports=()
@@ -107,15 +128,15 @@ run_peers() {
 run_stability() { "$project/tests/stability/run.sh" && "$project/tests/stability/run.sh" -r; }
 run_draw() {
   local kept
-  for kept in levels.csv chosen.csv peers.csv damping.csv import.csv speed.txt; do
+  for kept in levels.csv chosen.csv polish.csv peers.csv damping.csv import.csv speed.txt; do
     [ ! -f "$figures/$kept" ] || table "${kept%.*}" "${kept##*.}"
   done
 }
 
-[ $# -gt 0 ] || set -- scenes creature chosen levels speed import damping peers
+[ $# -gt 0 ] || set -- scenes creature chosen polish levels speed import damping peers stability
 for what; do
   [ "$(type -t "run_$what")" = function ] || {
-    echo "figures.sh: '$what' is nothing that it makes. Name scenes, creature, chosen, levels, speed, import, damping, peers, stability or draw." >&2
+    echo "figures.sh: '$what' is nothing that it makes. Name scenes, creature, chosen, polish, levels, speed, import, damping, peers, stability or draw." >&2
     exit 2
   }
 done

@@ -60,6 +60,21 @@ function chosen() {
   assert.deepEqual(lines_made('chosen', file('chosen.csv')), lines);
 }
 
+function polish() {
+  const creature = (way, correction_rms, shape_rms_length, open_loop) => {
+    mkdirSync(join(file('eel --nodes 40'), way), {recursive: true});
+    writeFileSync(join(file('eel --nodes 40'), way, 'report.json'), JSON.stringify({replay: {closed_loop: {correction_rms, shape_rms_length}, open_loop}}));
+  };
+  creature('off', 0.00213, 0.00481, {fell: true, fall_time_s: 3.12, duration_s: 9});
+  creature('on', 0.0000049, 0.00476, {fell: false, fall_time_s: null, duration_s: 9});
+  writeFileSync(file('polish.csv'), 'creature,correction_before,correction_after,open_loop_s_before,falls_before,open_loop_s_after,falls_after,shape_before,shape_after\n' +
+    'eel --nodes 40,1,1,1,1,1,1,1,1\nworm,0.001,0.0000001,10,0,10,0,0.001,0.001\n');
+  const lines = lines_made('polish', file('polish.csv'), file('eel --nodes 40'));
+  assert.deepEqual(lines.slice(2), ['| `eel` `--nodes 40` | 0.0021 | 0.0000049 | 3.1 s | 9 s (all) | 0.48 | 0.48 |',
+    '| `worm` | 0.001 | 0.0000001 | 10 s (all) | 10 s (all) | 0.10 | 0.10 |']);
+  assert.deepEqual(lines_made('polish', file('polish.csv')), lines);
+}
+
 /** The ratio of the times goes with a power of E and passes 1 at a known one. */
 function damping() {
   const measured = file('measured.csv');
@@ -123,4 +138,4 @@ function readme_is_true() {
   }
 }
 
-for (const check of [levels, chosen, damping, peers, imports_and_speed, refusals, stability, readme_is_true]) check();
+for (const check of [levels, chosen, polish, damping, peers, imports_and_speed, refusals, stability, readme_is_true]) check();

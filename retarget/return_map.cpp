@@ -54,6 +54,14 @@ Eigen::Vector3d courses(double phase) {
   return {swell, swell * std::cos(angle), swell * std::sin(angle)};
 }
 
+/// All of an error but what lies along the way: how far a leap carries is decided where it pushes off, and bends that were to change it
+/// would only turn the body.
+Eigen::Matrix3d without_way(const Eigen::Vector3d& stride) {
+  const Eigen::Vector3d way(0, stride.x(), stride.z());
+  if (way.isZero(0)) return Eigen::Matrix3d::Identity();
+  return Eigen::Matrix3d::Identity() - way * way.transpose() / way.squaredNorm();
+}
+
 Eigen::Matrix3d turned(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix(); }
 
 }  // namespace
@@ -72,7 +80,10 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
   const Eigen::Vector3d centre = plan.target.at(0).rowwise().mean(), stride = after_cycles(plan.target, 1) * centre - centre;
   const Eigen::Matrix3d back = turned(-yaw_);
   const Eigen::Vector3d aside = back * Eigen::Vector3d::UnitY().cross(stride);  // by a heading of 1 rad
-  if (has_flight(plan)) most_surprise_ = std::max(kSurprise, kSurpriseOfLeap * stride.norm() / length_);
+  if (has_flight(plan)) {
+    most_surprise_ = std::max(kSurprise, kSurpriseOfLeap * stride.norm() / length_);
+    counted_ = without_way(stride);
+  }
   onward_ << 1, 0, 0, aside.x(), back(0, 0), back(0, 2), aside.z(), back(2, 0), back(2, 2);
 }
 
@@ -123,9 +134,9 @@ void ReturnMap::steer() {
   Eigen::VectorXd pull = Eigen::VectorXd::Zero(kHandles);
   for (int k = 0; k < kCyclesAhead; ++k) {
     Eigen::Matrix<double, 3, kHandles> rows;
-    for (int h = 0; h < kHandles; ++h) rows.col(h) = per_length(reach.col(h), length_);
+    for (int h = 0; h < kHandles; ++h) rows.col(h) = counted_ * per_length(reach.col(h), length_);
     normal += rows.transpose() * rows;
-    pull += rows.transpose() * per_length(left, length_);
+    pull += rows.transpose() * counted_ * per_length(left, length_);
     reach = onward_ * reach;
     left = onward_ * left;
   }

@@ -58,6 +58,7 @@ class ReturnMap {
   double most_surprise_;  // per L
   bool is_loop_, has_learned_ = false, is_drifting_ = false, was_tried_ = false;
   Eigen::MatrixXd bends_;   // E x 2
+  Eigen::Matrix3d counted_ = Eigen::Matrix3d::Identity();  // what of an error is to be made up for
   Eigen::Matrix3d onward_;  // what one cycle makes of the error of the way by itself
   Eigen::Matrix<double, 3, kHandles> response_;
   WayError error_ = WayError::Zero(), drift_ = WayError::Zero();

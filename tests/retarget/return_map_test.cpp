@@ -170,6 +170,29 @@ TEST(ReturnMap, WhatLeapsMayLandFartherFromWhereItWasForeseen) {
   }
 }
 
+TEST(ReturnMap, BendsNothingForWhatALeapMissesAlongItsWay) {
+  for (const bool leaps : {false, true}) {
+    SCOPED_TRACE("leaps " + std::to_string(leaps));
+    PreparedTarget plan = going(ContactState::kStick, 2 * kLength);
+    if (leaps) std::fill_n(plan.contacts.state[0].begin(), 10, ContactState::kOff);
+    plan.contacts.touching.setConstant(1, 60, true);
+    const auto handles_after = [&](const Eigen::Vector2d& more) {
+      ReturnMap map(plan, kLength, make_box_creature().scene.body);
+      Plant plant = random_plant(3, 2 * kLength);
+      plant.go(map.handles(), true);
+      map.end_cycle(plant.error);
+      map.learn(plant.answers());
+      plant.go(map.handles());
+      plant.error.tail<2>() += more;
+      map.end_cycle(plant.error);
+      return map.handles();
+    };
+    const ReturnMap::Handles usual = handles_after({0, 0});
+    EXPECT_EQ((handles_after({0.02 * kLength, 0}) - usual).norm() < 1e-12, leaps);
+    EXPECT_GT((handles_after({0, 0.02 * kLength}) - usual).norm(), 1e-4);
+  }
+}
+
 TEST(ReturnMap, SeesTheErrorFromTheTargetsHeading) {
   const double yaw = 0.4;
   const ReturnMap map(going(ContactState::kSlide, 0, yaw), kLength, make_box_creature().scene.body);

@@ -6,7 +6,6 @@
 
 #include "tests/e2e/made_creature.h"
 #include "tests/e2e/trace_audit.h"
-#include "tests/sanitizers.h"
 
 namespace hydrostat::convert_test {
 namespace {
@@ -414,7 +413,6 @@ TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
 
 /// Springs alone are another body: shorter steps of them do not show what they err by.
 TEST(Convert, HoldsAGivenMethodAgainstAnAccurateOne) {
-  if (kSanitized) GTEST_SKIP() << "minutes with sanitizers";
   const TemporaryDirectory directory;
   const Outcome outcome = convert(directory.path, kSmallClip, "creature", std::string(kSmallOptions) + "--method spring --max-error 0.3%");
   EXPECT_EQ(outcome.exit_code, 3);
@@ -438,7 +436,6 @@ int most_nodes_tried(const fs::path& creature) {
 }
 
 TEST(Convert, TakesACoarserMeshWhereItKeepsTheErrorAndRemembersIt) {
-  if (kSanitized) GTEST_SKIP() << "minutes with sanitizers";
   const TemporaryDirectory directory;
   const fs::path creature = directory.path / "creature";
   const Outcome outcome = convert(directory.path, kSmallClip, "creature", "--max-error 4%");

@@ -30,6 +30,14 @@ PreparedTarget going(ContactState state, double stride = 0, double yaw = 0, bool
   return plan;
 }
 
+/// It takes strides of 2 L, and leaps in a sixth of the cycle or does not.
+PreparedTarget striding(bool leaps) {
+  PreparedTarget plan = going(ContactState::kStick, 2 * kLength);
+  if (leaps) std::fill_n(plan.contacts.state[0].begin(), 10, ContactState::kOff);
+  plan.contacts.touching.setConstant(1, 60, true);
+  return plan;
+}
+
 /// A body that does what a linear return map says.
 struct Plant {
   Response response = Response::Zero();
@@ -150,9 +158,7 @@ TEST(ReturnMap, RestsForACycleAfterWhatItDidNotForesee) {
 TEST(ReturnMap, WhatLeapsMayLandFartherFromWhereItWasForeseen) {
   for (const bool leaps : {false, true}) {
     SCOPED_TRACE("leaps " + std::to_string(leaps));
-    PreparedTarget plan = going(ContactState::kStick, 2 * kLength);
-    if (leaps) std::fill_n(plan.contacts.state[0].begin(), 10, ContactState::kOff);
-    plan.contacts.touching.setConstant(1, 60, true);
+    const PreparedTarget plan = striding(leaps);
     ReturnMap map(plan, kLength, make_box_creature().scene.body);
     Plant plant = random_plant(3, 2 * kLength);
     plant.go(map.handles(), true);
@@ -173,9 +179,7 @@ TEST(ReturnMap, WhatLeapsMayLandFartherFromWhereItWasForeseen) {
 TEST(ReturnMap, BendsNothingForWhatALeapMissesAlongItsWay) {
   for (const bool leaps : {false, true}) {
     SCOPED_TRACE("leaps " + std::to_string(leaps));
-    PreparedTarget plan = going(ContactState::kStick, 2 * kLength);
-    if (leaps) std::fill_n(plan.contacts.state[0].begin(), 10, ContactState::kOff);
-    plan.contacts.touching.setConstant(1, 60, true);
+    const PreparedTarget plan = striding(leaps);
     const auto handles_after = [&](const Eigen::Vector2d& more) {
       ReturnMap map(plan, kLength, make_box_creature().scene.body);
       Plant plant = random_plant(3, 2 * kLength);

@@ -32,6 +32,8 @@ constexpr double kUsualError = 0.01;  // per L
 constexpr double kLevels[] = {0.25, 0.5, 1, 2, 4};     // of a creature's nodes
 constexpr double kOtherLevels[] = {0.5, 1};            // where it is made of other elements than its own
 constexpr int kFewestNodes = 20;                       // of a level
+constexpr double kBriefMs = 40;                        // of the processor: a row that takes less is timed
+constexpr int kTimings = 4;                            // so many times
 constexpr double kBriefly = 4;                         // [s] for which a level has to stay up
 constexpr double kHarmonics[] = {1, 0.75, 0.5, 0.25};  // of a creature's
 
@@ -99,15 +101,25 @@ class Bench {
     }
     refuse_below_floor(command_.max_error, curve_.max_error, curve_.floor);
     if (command_.max_error.empty() && curve_.max_error <= curve_.floor) ask_for_least();
-    curve_.recommended = retarget::cheapest_within(curve_.rows, curve_.max_error * length_);
+    curve_.recommended = retarget::cheapest_within(curve_.rows, curve_.max_error * length_, &retarget::AccuracyRow::ms_per_sim_s);
     return std::move(curve_);
   }
 
  private:
-  /// The usual error cannot be told: the least that can is marked, and the page says so.
+  /// What takes short is timed again: other work on the machine only adds to a time.
+  template <class Measure>
+  retarget::AccuracyRow timed(const Measure& measure) const {
+    retarget::AccuracyRow row = measure();
+    for (int k = 1; k < kTimings && row.ms_per_sim_s * options_.duration_s < kBriefMs; ++k) {
+      row.ms_per_sim_s = std::min(row.ms_per_sim_s, measure().ms_per_sim_s);
+    }
+    return row;
+  }
+
+  /// The usual error cannot be told: the cheapest within the least that can is marked, and the page says so.
   void ask_for_least() {
     char text[160];
-    std::snprintf(text, sizeof text, " The usual %.3g %% cannot be told by it: marked is the least work within the least error that can.",
+    std::snprintf(text, sizeof text, " The usual %.3g %% cannot be told by it: marked is the least time within the least error that can.",
                   100 * curve_.max_error);
     curve_.truth += text;
     curve_.max_error = curve_.floor;
@@ -154,7 +166,7 @@ class Bench {
       progress_.begin(std::to_string(scenario.scene.body.node_count()) + " nodes, " + mesh.element);
       for (const auto& of_method : retarget::settings_to_try(scenario.scene, options_.step_frame_s)) {
         for (const retarget::StepSetting& setting : of_method) {
-          curve_.rows.push_back(retarget::measure_error(reference, scenario, setting));
+          curve_.rows.push_back(timed([&] { return retarget::measure_error(reference, scenario, setting); }));
         }
       }
     }
@@ -186,7 +198,7 @@ class Bench {
       const retarget::ScenarioOf<3> scenario = retarget::performed_scenario(performer, creature.signals, harmonics);
       for (const auto& of_method : retarget::settings_to_try(scenario.scene, options_.step_frame_s)) {
         for (const retarget::StepSetting& setting : of_method) {
-          curve_.rows.push_back(retarget::measure_error(reference, scenario, setting));
+          curve_.rows.push_back(timed([&] { return retarget::measure_error(reference, scenario, setting); }));
           curve_.rows.back().harmonics = harmonics;
         }
       }
@@ -242,7 +254,8 @@ class Bench {
     retarget::ReplayOptions& replay = brief.replay;
     replay.method = physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
     take_steps(replay, {replay.method, io::setting(creature.record, "step_s", replay.step_s)});
-    retarget::AccuracyRow row = retarget::measure_level(reference, level.performer, level.signals, {replay.method, replay.step_s});
+    const retarget::StepSetting setting{replay.method, replay.step_s};
+    retarget::AccuracyRow row = timed([&] { return retarget::measure_level(reference, level.performer, level.signals, setting); });
     row.harmonics = level.signals.activation.harmonics();
     brief.baselines = false;
     replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);

@@ -107,7 +107,7 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
       ->capture_default_str();
   app.add_flag("--calibrated", options.calibrated,
                             "Tets of finite elements bend as the cells would that they are cut from");
-  app.add_option("--method", options.method, "Time integration: auto, explicit or euler")
+  app.add_option("--method", options.method, "Time integration: explicit, implicit, euler, xpbd, spring; auto: explicit, or what --max-error chooses")
       ->check(CLI::IsMember(kMethods))
       ->capture_default_str();
   add_accuracy_options(app, options.accuracy);

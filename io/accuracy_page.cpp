@@ -81,7 +81,7 @@ std::string sentence(const AccuracyCurve& curve) {
   if (curve.recommended < 0) return "No setting stays within " + percent(curve.max_error) + " of L.";
   const AccuracyRow& row = curve.rows[static_cast<std::size_t>(curve.recommended)];
   const std::string loop = row.loop_error_m >= 0 ? ", closed loop too" : "";
-  return "Ringed: the least work within " + percent(curve.max_error) + " of L" + loop + ": " + name_of(row) + ".";
+  return std::string("Ringed: the least ") + (curve.is_counted ? "work" : "processor time") + " within " + percent(curve.max_error) + " of L" + loop + ": " + name_of(row) + ".";
 }
 
 std::string second_sentence(const AccuracyCurve& curve) {
@@ -232,10 +232,11 @@ std::string accuracy_page(const AccuracyCurve& curve) {
       ".5em;text-align:right}tr:target{background:#fe9}.chosen{font-weight:bold}a{cursor:"
       "pointer}</style>\n<h1>Accuracy against time: " +
       escaped(curve.subject) + "</h1>\n<p>" + escaped(curve.truth) + " No error below " + percent(curve.floor) +
-      " of L can be told by it. A click on a point leads to its row; empty points are of hexahedra or quads. Choices go by "
-      "counted work, which "
-      "is the same on every machine; the picture shows " +
-      (curve.is_counted ? "it" : "this machine's processor time") + ".</p>\n";
+      " of L can be told by it. A click on a point leads to its row; empty points are of hexahedra or quads. " +
+      (curve.is_counted ? "The picture shows counted work, which is the same on every machine, and the choice goes by it."
+                        : "Picture and ring go by this machine's processor time; choices (--max-error) go by counted work, which is the same "
+                          "on every machine.") +
+      "</p>\n";
   return html + diagram(curve, true) + table(curve, retarget::pareto_front(curve.rows, time_of(curve))) + "</html>\n";
 }
 

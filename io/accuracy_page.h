@@ -12,10 +12,10 @@ struct AccuracyCurve {
   std::string subject;  // the scene's file or the creature's directory
   std::string truth;    // in words: what errors are told against
   std::vector<retarget::AccuracyRow> rows;
-  int recommended = -1;  // the cheapest row by counted work within max_error; -1: none
+  int recommended = -1;  // the row of least time, as it is drawn, within max_error; -1: none
   double max_error = 0;  // per L
   double floor = 0;      // per L: no error below it can be told
-  bool is_counted = false;  // drawn over counted work, by which the ringed one was chosen; else over the clock's time
+  bool is_counted = false;  // drawn over counted work, by which choices go; else over the clock's time
 };
 
 /// A table with a header, one line a row: method, element, nodes, dt_s, iterations, harmonics, error_rms_m,

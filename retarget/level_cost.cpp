@@ -20,7 +20,7 @@ double frame_work_ms(const physics::Scene& scene, Eigen::Index muscles, const Re
   simulation.figures = false;
   const Simulation run = simulate(scenario, simulation);
   const double corrections = options.correct ? kFrame / (options.step_s * options.steps_per_control) : 0;
-  return counted_ms(scene, options.method, run.work) / simulation.duration_s * kFrame +
+  return counted_ms(scene, options.method, std::round(simulation.duration_s / simulation.dt_s), run.work) / simulation.duration_s * kFrame +
          corrections * counted_ms_of_correction(scene, muscles);
 }
 

@@ -80,11 +80,11 @@ std::vector<bool> pareto_front(const std::vector<AccuracyRow>& rows, double Accu
   return front;
 }
 
-int cheapest_within(const std::vector<AccuracyRow>& rows, double most_m) {
+int cheapest_within(const std::vector<AccuracyRow>& rows, double most_m, double AccuracyRow::* time) {
   int best = -1;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (!rows[k].stable || !(rows[k].error_rms_m <= most_m)) continue;
-    if (best < 0 || rows[k].work_ms < rows[static_cast<std::size_t>(best)].work_ms) best = static_cast<int>(k);
+    if (best < 0 || rows[k].*time < rows[static_cast<std::size_t>(best)].*time) best = static_cast<int>(k);
   }
   return best;
 }

@@ -5,48 +5,89 @@
 namespace hydrostat::retarget {
 namespace {
 
-/// What a body is made of, as loops see it.
-struct Counts {
-  double nodes = 0, springs = 0, volumes = 0, simplices = 0, boxes = 0, pairs = 0;
+/// What a step goes over: how much of each there is, or what one of each takes [ns].
+struct Parts {
+  double one = 0, nodes = 0, edges = 0, springs = 0, dashpots = 0, volumes = 0;
+  double simplices = 0, corotated = 0, boxes = 0;  // elements; corotated: of the simplices those of that law, on top
+  double touching = 0, wet = 0;                    // places of the surface: for each thing that may be touched, each fluid
 };
+double operator*(const Parts& a, const Parts& b) {
+  return a.one * b.one + a.nodes * b.nodes + a.edges * b.edges + a.springs * b.springs + a.dashpots * b.dashpots +
+         a.volumes * b.volumes + a.simplices * b.simplices + a.corotated * b.corotated + a.boxes * b.boxes +
+         a.touching * b.touching + a.wet * b.wet;
+}
 
 template <int Dim>
-Counts counts_of(const physics::BodyOf<Dim>& body) {
-  Counts counts;
+Parts counts_of(const physics::SceneOf<Dim>& scene) {
+  const physics::BodyOf<Dim>& body = scene.body;
+  Parts counts;
+  counts.one = 1;
   counts.nodes = body.node_count();
-  counts.pairs = body.edge_count();
-  if (body.elements.empty() || body.edge_damping.maxCoeff() > 0) counts.springs = body.edge_count();
+  counts.edges = body.edge_count();
+  counts.springs = static_cast<double>((body.edge_stiffness.array() > 0).count());
+  counts.dashpots = static_cast<double>((body.edge_damping.array() > 0).count());
   counts.volumes = static_cast<double>(body.volume_stiffness.size());
   for (const physics::BodyElements<Dim>& elements : body.elements) {
-    (elements.block.is_box() ? counts.boxes : counts.simplices) += elements.block.element_count();
+    const double count = elements.block.element_count();
+    (elements.block.is_box() ? counts.boxes : counts.simplices) += count;
+    if (!elements.block.is_box() && elements.block.law == physics::ElasticLaw::kCorotatedLinear) counts.corotated += count;
   }
+  const double places = scene.contact_points.count();
+  counts.touching = places * (static_cast<double>(scene.obstacles.size()) + (scene.has_ground ? 1 : 0));
+  counts.wet = places * ((scene.water ? 1 : 0) + (scene.air ? 1 : 0));
   return counts;
 }
 
-/// [ns] of each part, in two and three dimensions.
+/// [ns] of a method.
 struct Cost {
-  double nodes, springs, volumes, simplices, boxes, pairs;
-  double of(const Counts& counts) const {
-    return nodes * counts.nodes + springs * counts.springs + volumes * counts.volumes + simplices * counts.simplices +
-           boxes * counts.boxes + pairs * counts.pairs;
-  }
+  Parts step, pass, assembly;  // an outer step, a pass over the body (a sweep over its constraints), an assembled matrix
+  double product;              // of two blocks
 };
-// Fitted to the processor time of 360 runs (least squares of the relative error, no constant below 0): bars of 20 to 300
-// nodes in the plane and of 40 to 400 in space, of springs, triangles or tets, quads or hexahedra, with and without
-// dashpots, clamped at one end, by every method at 60 and 240 steps/s; one thread of a machine that did other work too, the
-// best of eight times. Nine of ten runs lie within 0.6 and 1.25 of it.
-constexpr Cost kSubstep[] = {{31, 4, 0, 5, 9, 0}, {24, 4, 29, 30, 200, 0}};  // explicit
-// What springs' own substep takes of that of `explicit`, and what an outer step does, is from bars of 27 to 400 nodes, each in
-// three steps, the best of nine times.
-constexpr Cost kSpringSubstep[] = {{30, 0, 0, 0, 0, 1.7}, {2, 0, 0, 0, 0, 15.5}};
-constexpr double kGuardedStep[] = {36, 130};  // [ns] of a node
-constexpr Cost kPass[] = {{0, 6, 36, 37, 76, 0}, {0, 4, 39, 31, 200, 0}};  // implicit, euler
-constexpr Cost kSweep[] = {{19, 14, 18, 80, 140, 0}, {0, 26, 58, 235, 850, 0}};
-constexpr Cost kAssembly[] = {{300, 0, 21, 516, 906, 0}, {67, 100, 0, 2940, 10100, 0}};
-constexpr double kProduct[] = {2.1, 15};  // [ns] of two blocks
+// In the order of physics::Method, in two and three dimensions; where `explicit` assembles it is its guard, euler.
+// Fitted to processor time (least squares of the relative error, no constant below 0; euler's passes as those of implicit): some
+// 4,100 runs of tests/bench/run.sh costs on one thread of a machine of two cores that did other work too, the least of two to four
+// times. Nine of ten lie within 0.74 and 1.2 of it.
+constexpr Cost kCosts[2][5] = {
+    {
+        {{.one = 820, .nodes = 20, .simplices = 200, .boxes = 230, .touching = 28, .wet = 62},
+         {.nodes = 19, .volumes = 4.4, .simplices = 20, .corotated = 6.6, .boxes = 35, .touching = 6.6},
+         {.springs = 79, .volumes = 17, .simplices = 620, .boxes = 1100}, 5.5},  // explicit
+        {{.nodes = 80, .simplices = 57, .touching = 180, .wet = 76},
+         {.nodes = 21, .dashpots = 2.2, .simplices = 13, .boxes = 19},
+         {.nodes = 390, .volumes = 210, .simplices = 89}, 8.8},  // implicit
+        {{.one = 230, .nodes = 110, .simplices = 100, .boxes = 160, .touching = 410, .wet = 45},
+         {.nodes = 21, .dashpots = 2.2, .simplices = 13, .boxes = 19},
+         {.springs = 79, .volumes = 17, .simplices = 620, .boxes = 1100}, 5.5},  // euler
+        {{.one = 650, .simplices = 160, .boxes = 190, .touching = 23, .wet = 52},
+         {.springs = 24, .dashpots = 26, .simplices = 71, .corotated = 6, .boxes = 160},
+         {}, 0},  // xpbd
+        {{.one = 830, .nodes = 3.3, .touching = 30, .wet = 53},
+         {.nodes = 2.2, .edges = 6.7, .touching = 16},
+         {}, 0},  // spring
+    },
+    {
+        {{.nodes = 98, .simplices = 260, .boxes = 470, .touching = 68, .wet = 150},
+         {.nodes = 43, .springs = 1.1, .dashpots = 2.2, .volumes = 7.6, .simplices = 27, .corotated = 25, .boxes = 170},
+         {.springs = 120, .volumes = 190, .simplices = 3000, .boxes = 11000}, 9},  // explicit
+        {{.one = 4800, .nodes = 34, .simplices = 150, .touching = 470, .wet = 100},
+         {.nodes = 6.5, .dashpots = 4.3, .volumes = 35, .simplices = 34, .corotated = 19, .boxes = 190},
+         {.nodes = 980, .springs = 120, .volumes = 400, .simplices = 2700, .boxes = 8500}, 9.7},  // implicit
+        {{.one = 1400, .nodes = 49, .simplices = 180, .boxes = 2000, .touching = 750, .wet = 73},
+         {.nodes = 6.5, .dashpots = 4.3, .volumes = 35, .simplices = 34, .boxes = 190},
+         {.springs = 120, .volumes = 190, .simplices = 3000, .boxes = 11000}, 9},  // euler
+        {{.one = 910, .simplices = 200, .boxes = 480, .wet = 150},
+         {.nodes = 18, .springs = 9.2, .dashpots = 35, .volumes = 54, .simplices = 150, .corotated = 130, .boxes = 710},
+         {}, 0},  // xpbd
+        {{.one = 1200, .nodes = 4.4, .touching = 36, .wet = 140},
+         {.nodes = 10, .edges = 6.7, .touching = 16},
+         {}, 0},  // spring
+    },
+};
 // Of corrections likewise, in replays of two dogs, a snake and a frog on 28 to 870 nodes, 48 to 72 of each: three of four
 // levels lie within 0.85 and 1.2 of it, all within 0.7 and 1.6. All had 117 muscles: what hangs on their number alone is
 // kMuscles' share.
+constexpr Parts kResponseAssembly{.nodes = 67, .edges = 100, .simplices = 2940, .boxes = 10100};
+constexpr double kResponseProduct = 15;  // [ns] of two blocks
 constexpr double kColumnProduct = 3.8;  // [ns] of a block and one of many columns
 constexpr double kNormal = 0.41;        // [ns] of a product in the normal equations
 constexpr double kPlayed = 0.2;         // [ns] of a channel and a wave of it, two a harmonic, in playing signals
@@ -54,40 +95,32 @@ constexpr double kRows = 11;            // [ns] of a row and a muscle, in all th
 constexpr double kMuscles = 0.15;       // [ns] of a cubed muscle: solving within the cones
 constexpr double kAnew = 0.66;          // share of the calls that make the response anew: 0.25 to 0.98 in replays of six creatures
 
-const Cost& cost_of_pass(physics::Method method, int row) {
-  if (method == physics::Method::kExplicit) return kSubstep[row];
-  return method == physics::Method::kSpring ? kSpringSubstep[row] : kPass[row];
+template <int Dim>
+const Cost& cost_of(physics::Method method) {
+  return kCosts[Dim - 2][static_cast<std::size_t>(method)];
 }
 
 }  // namespace
 
 template <int Dim>
-double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, const physics::StepWork& work) {
-  const Counts counts = counts_of(scene.body);
-  constexpr int kRow = Dim - 2;
-  return 1e-6 * (work.passes * cost_of_pass(method, kRow).of(counts) + work.sweeps * kSweep[kRow].of(counts) +
-                 work.assemblies * kAssembly[kRow].of(counts) + work.products * kProduct[kRow]);
+double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, double steps, const physics::StepWork& work) {
+  const Parts counts = counts_of(scene);
+  const Cost& cost = cost_of<Dim>(method);
+  return 1e-6 * (steps * (cost.step * counts) + (work.passes + work.sweeps) * (cost.pass * counts) +
+                 work.assemblies * (cost.assembly * counts) + work.products * cost.product);
 }
-template double counted_ms<2>(const physics::SceneOf<2>&, physics::Method, const physics::StepWork&);
-template double counted_ms<3>(const physics::SceneOf<3>&, physics::Method, const physics::StepWork&);
-
-template <int Dim>
-double counted_ms_of_steps(const physics::SceneOf<Dim>& scene, physics::Method method, double steps) {
-  if (method != physics::Method::kExplicit) return 0;
-  return 1e-6 * kGuardedStep[Dim - 2] * scene.body.node_count() * steps;
-}
-template double counted_ms_of_steps<2>(const physics::SceneOf<2>&, physics::Method, double);
-template double counted_ms_of_steps<3>(const physics::SceneOf<3>&, physics::Method, double);
+template double counted_ms<2>(const physics::SceneOf<2>&, physics::Method, double, const physics::StepWork&);
+template double counted_ms<3>(const physics::SceneOf<3>&, physics::Method, double, const physics::StepWork&);
 
 double counted_ms_of_signals(Eigen::Index channels, int harmonics) {
   return 1e-6 * kPlayed * static_cast<double>(channels) * 2 * (harmonics + 1);
 }
 
 double counted_ms_of_correction(const physics::Scene& scene, Eigen::Index muscles) {
-  const Counts counts = counts_of(scene.body);
+  const Parts counts = counts_of(scene);
   const physics::SystemMatrix matrix(scene.body);
   const double rows = 3 * counts.nodes, columns = static_cast<double>(muscles);
-  const double response = kAssembly[1].of(counts) + kProduct[1] * matrix.products_to_factor() +
+  const double response = kResponseAssembly * counts + kResponseProduct * matrix.products_to_factor() +
                           kColumnProduct * columns * matrix.products_to_solve() + kNormal * rows * columns * columns / 2;
   return 1e-6 * (kAnew * response + kRows * rows * columns + kMuscles * columns * columns * columns);
 }

@@ -4,14 +4,17 @@
 # our methods and Bullet's deformable body on the same meshes; exit code 1 if a goal is missed. All three sizes take a quarter of an hour.
 #   tests/bench/run.sh damping [-o DIR]
 # explicit and implicit over damping and stiffness.
+#   tests/bench/run.sh costs [-o DIR] [-r ROUNDS]
+# counted work (retarget/step_cost.h) against processor time, every method on bodies of all kinds: a quarter of an hour.
 # Installs what is missing, builds, prints a table in markdown and writes it to DIR (default: out/peers/peers.csv,
-# out/damping/damping.csv).
+# out/damping/damping.csv, out/costs/costs.csv).
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")")
 program=peer_bench
 case ${1:-} in
   peers) shift ;;
   damping) program=damping_bench && shift ;;
+  costs) program=step_cost_bench && shift ;;
 esac
 "$project/samples/setup.sh" --bench
 cd -- "$project"

@@ -279,5 +279,32 @@ TEST(ParetoFront, HoldsWhatNothingBeatsInBoth) {
   EXPECT_EQ(most_accurate(rows), 1);
 }
 
+/// By the time by which it is taken, whichever that is.
+TEST(CheapestWithin, LeavesNothingBothCheaperAndMoreExact) {
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> any(0, 1);
+    std::vector<AccuracyRow> rows(20);
+    for (AccuracyRow& row : rows) {
+      row.error_rms_m = any(random);
+      row.ms_per_sim_s = any(random);
+      row.work_ms = any(random);
+      row.stable = any(random) < 0.8;
+      if (!row.stable) row.ms_per_sim_s = std::nan("");
+    }
+    for (double AccuracyRow::* time : {&AccuracyRow::work_ms, &AccuracyRow::ms_per_sim_s}) {
+      const int taken = cheapest_within(rows, 0.5, time);
+      ASSERT_GE(taken, 0);
+      const AccuracyRow& best = rows[static_cast<std::size_t>(taken)];
+      EXPECT_LE(best.error_rms_m, 0.5);
+      EXPECT_TRUE(best.stable);
+      for (const AccuracyRow& row : rows) {
+        EXPECT_FALSE(row.stable && row.*time < best.*time && row.error_rms_m < best.error_rms_m);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hydrostat::retarget::accuracy_test

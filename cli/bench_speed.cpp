@@ -116,7 +116,7 @@ void measure_replay(const retarget::Performer& performer, const retarget::Signal
   const double simulation_ms = ms_of(simulation, [&] { return retarget::simulate(scenario, steps); });
   const double simulated_s = std::max(1, static_cast<int>(simulation.motion.count()) - 1) / simulation.motion.rate_hz;
   row.simulation_ms = simulation_ms / simulated_s;
-  row.counted_ms = retarget::counted_ms(scenario.scene, method, simulated_s / steps.dt_s, simulation.work) / simulated_s;
+  row.counted_ms = retarget::counted_ms(scenario.scene, method, true, simulated_s / steps.dt_s, simulation.work) / simulated_s;
   retarget::PerformOptions perform;
   perform.replay.method = method;
   perform.replay.duration_s = duration_s;

@@ -84,6 +84,13 @@ Repeated<Dim> repeat(const ScenarioOf<Dim>& scenario, const std::vector<WindowOf
   return repeated;
 }
 
+/// Counted.
+template <int Dim>
+double work_ms(const ScenarioOf<Dim>& scenario, const StepSetting& setting, const Repeated<Dim>& repeated) {
+  const bool is_active = scenario.drive || !scenario.waves.empty();
+  return counted_ms(scenario.scene, setting.method, is_active, repeated.steps, repeated.work);
+}
+
 /// [m] RMS over points and frames.
 template <int Dim>
 double distance(const std::vector<PointsOf<Dim>>& a, const std::vector<PointsOf<Dim>>& b) {
@@ -238,7 +245,7 @@ ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyO
   reference.setting = is_stiff ? by_implicit : by_explicit;
   const auto run = [&](const StepSetting& setting) {
     Repeated<Dim> made = repeat(scenario, reference.windows, setting, options.frame_s, reference.skin, false);
-    reference.work_ms += counted_ms(scenario.scene, setting.method, made.steps, made.work);
+    reference.work_ms += work_ms(scenario, setting, made);
     return made;
   };
   const auto twice = [&](const StepSetting& setting) {
@@ -279,7 +286,7 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   row.error_rel_length = row.error_rms_m / reference.scenario.length;
   if (repeated.seconds > 0) row.ms_per_sim_s = 1000 * repeated.busy_s / repeated.seconds;
   if (repeated.seconds > 0) {
-    row.work_ms = counted_ms(scenario.scene, setting.method, repeated.steps, repeated.work) / repeated.seconds;
+    row.work_ms = work_ms(scenario, setting, repeated) / repeated.seconds;
   }
   row.volume_error = repeated.worst.volume_error_max;
   row.momentum_error = repeated.worst.momentum_residual_mg;
@@ -325,8 +332,7 @@ Parted parted(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options, c
   const Repeated<Dim> a = repeat(scenario, windows, coarse, options.frame_s, skin, false);
   const Repeated<Dim> b = repeat(scenario, windows, fine, options.frame_s, skin, false);
   const double seconds = static_cast<double>(windows.size()) * windows.front().duration_s;
-  return {distance<Dim>(a.places, b.places), windows.front().duration_s, counted_ms(scenario.scene, coarse.method, a.steps, a.work) / seconds,
-          counted_ms(scenario.scene, fine.method, b.steps, b.work) / seconds};
+  return {distance<Dim>(a.places, b.places), windows.front().duration_s, work_ms(scenario, coarse, a) / seconds, work_ms(scenario, fine, b) / seconds};
 }
 
 }  // namespace

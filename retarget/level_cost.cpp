@@ -20,7 +20,8 @@ double frame_work_ms(const physics::Scene& scene, Eigen::Index muscles, const Re
   simulation.figures = false;
   const Simulation run = simulate(scenario, simulation);
   const double corrections = options.correct ? kFrame / (options.step_s * options.steps_per_control) : 0;
-  return counted_ms(scene, options.method, std::round(simulation.duration_s / simulation.dt_s), run.work) / simulation.duration_s * kFrame +
+  const double steps = std::round(simulation.duration_s / simulation.dt_s);
+  return counted_ms(scene, options.method, true, steps, run.work) / simulation.duration_s * kFrame +
          corrections * counted_ms_of_correction(scene, muscles);
 }
 

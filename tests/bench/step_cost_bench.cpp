@@ -104,7 +104,7 @@ void take(Run& run) {
     run.steps = std::round(made.report.duration_s / run.dt_s);
     run.work = made.work;
     run.is_plain = !made.report.diverged && made.report.guard_steps == 0;
-    run.counted_ms = retarget::counted_ms(scenario.scene, run.method, run.steps, run.work);
+    run.counted_ms = retarget::counted_ms(scenario.scene, run.method, run.surroundings.is_active, run.steps, run.work);
   };
   std::visit(simulate_in, run.scene.scenario);
 }

@@ -6,6 +6,7 @@
 #include "cli/conversion.h"
 #include "cli/outcome.h"
 #include "cli/stage_key.h"
+#include "io/write_error.h"
 #include "retarget/error.h"
 #include "retarget/performed_scenario.h"
 
@@ -119,7 +120,9 @@ std::unique_ptr<Conversion> Conversion::on_coarser_mesh(const io::ImportedCharac
   try {
     coarser->add_warnings(imported.warnings);
     coarser->solve(imported, wished_limit);
-  } catch (const Error&) {
+  } catch (const io::WriteError&) {
+    throw;
+  } catch (const Error&) {  // no body or no plan on so few nodes
     return nullptr;
   }
   coarser->chosen_ = chosen_;

@@ -1,7 +1,6 @@
 #include "cli/level_option.h"
 
 #include <cmath>
-#include <cstdio>
 
 #include "cli/asked_accuracy.h"
 #include "cli/number_option.h"
@@ -14,14 +13,13 @@ constexpr const char* kAuto = "auto";
 constexpr double kFewest = 20, kMost = 5000;              // nodes
 constexpr double kLeastBudget = 1e-3, kMostBudget = 1e5;  // [ms]
 
-/// [ms]; 0: none.
-double budget_of(const AskedLevel& asked, const std::string& command) {
+}  // namespace
+
+double budget_ms(const AskedLevel& asked, const std::string& command) {
   if (asked.budget.empty()) return 0;
   const std::string number = asked.budget.ends_with("ms") ? asked.budget.substr(0, asked.budget.size() - 2) : asked.budget;
   return parse_number(number, kLeastBudget, kMostBudget, command, "--budget");
 }
-
-}  // namespace
 
 void add_level_options(CLI::App& app, AskedLevel& asked) {
   CLI::Option* lod = app.add_option(
@@ -34,11 +32,11 @@ void add_level_options(CLI::App& app, AskedLevel& asked) {
       ->needs(lod);
 }
 
-std::vector<retarget::LevelCost> levels_within(const AskedLevel& asked, const std::string& command,
-                                               const io::LoadedCreature& creature, const retarget::Rig& rig,
-                                               const retarget::ReplayOptions& replay) {
+std::vector<retarget::LevelCost> levels_asked_among(const AskedLevel& asked, const std::string& command,
+                                                    const io::LoadedCreature& creature, const retarget::Rig& rig,
+                                                    const retarget::ReplayOptions& replay) {
   const retarget::Performer& performer = creature.target.performer;
-  const double budget = budget_of(asked, command);
+  const double budget = budget_ms(asked, command);
   if (asked.lod != kAuto) {
     if (budget > 0) {
       throw UsageError(command, "option --budget", "is for --lod auto, and --lod tells a number of nodes",
@@ -55,19 +53,15 @@ std::vector<retarget::LevelCost> levels_within(const AskedLevel& asked, const st
   if (budget == 0) {
     throw UsageError(command, "option --lod", "auto goes by a budget, and there is none", "Give --budget 2ms, say.");
   }
-  const std::vector<retarget::LevelCost> costs = retarget::level_costs(performer, rig, io::level_options(creature), replay);
-  std::vector<retarget::LevelCost> within;
-  const retarget::LevelCost* cheapest = &costs.front();
-  for (const retarget::LevelCost& cost : costs) {
-    if (cost.work_ms <= budget) within.push_back(cost);
-    if (cost.work_ms < cheapest->work_ms) cheapest = &cost;
-  }
-  if (!within.empty()) return within;
-  char text[200], mend[80];
-  std::snprintf(text, sizeof text, "no level takes %.3g ms a frame or less; the cheapest, of %d nodes, takes %.3g ms",
-                budget, cheapest->nodes, cheapest->work_ms);
-  std::snprintf(mend, sizeof mend, "Allow %.2gms.", 1.1 * cheapest->work_ms);
-  throw UsageError(command, "option --budget", text, mend);
+  return retarget::level_costs(performer, rig, io::level_options(creature), replay);
+}
+
+std::vector<retarget::LevelCost> levels_within(const std::vector<retarget::LevelCost>& levels, const AskedLevel& asked,
+                                               const std::string& command) {
+  const double budget = budget_ms(asked, command);
+  std::vector<retarget::LevelCost> within = levels;
+  if (budget > 0) std::erase_if(within, [&](const retarget::LevelCost& cost) { return cost.work_ms > budget; });
+  return within;
 }
 
 io::LoadedCreature at_level(const io::LoadedCreature& creature, const retarget::Rig& rig, const retarget::LevelCost& cost,
@@ -91,7 +85,7 @@ io::LoadedCreature at_level(const io::LoadedCreature& creature, const retarget::
   report.pieces = performer.mesh.pieces;
   report.bridged_cells = performer.mesh.bridged_cells;
   report.copied_cells = performer.mesh.copied_cells;
-  level.target.report.level = retarget::LevelReport{report.nodes, solved_nodes, cost.work_ms, budget_of(asked, command)};
+  level.target.report.level = retarget::LevelReport{report.nodes, solved_nodes, cost.work_ms, budget_ms(asked, command)};
   return level;
 }
 

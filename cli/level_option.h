@@ -20,11 +20,18 @@ struct AskedLevel {
 /// Adds both options.
 void add_level_options(CLI::App& app, AskedLevel& asked);
 
-/// The levels of a creature that were asked for, the finest first: one number of nodes, or those that the budget allows.
-/// Throws UsageError, which tells what is possible, for a budget that no level meets.
-std::vector<retarget::LevelCost> levels_within(const AskedLevel& asked, const std::string& command,
-                                               const io::LoadedCreature& creature, const retarget::Rig& rig,
-                                               const retarget::ReplayOptions& replay);
+/// The budget for a frame [ms], 0 for none. Throws UsageError for what is no time.
+double budget_ms(const AskedLevel& asked, const std::string& command);
+
+/// The levels of a creature that are asked among, the finest first: one number of nodes, whose cost is not told, or for auto those that
+/// there are, each with its cost. Throws UsageError for what is no number of nodes or no budget.
+std::vector<retarget::LevelCost> levels_asked_among(const AskedLevel& asked, const std::string& command,
+                                                    const io::LoadedCreature& creature, const retarget::Rig& rig,
+                                                    const retarget::ReplayOptions& replay);
+
+/// Of these levels those that the budget allows; all where there is no budget.
+std::vector<retarget::LevelCost> levels_within(const std::vector<retarget::LevelCost>& levels, const AskedLevel& asked,
+                                               const std::string& command);
 
 /// The creature at a level, in the place of the solved one, and what its report tells of it.
 io::LoadedCreature at_level(const io::LoadedCreature& creature, const retarget::Rig& rig, const retarget::LevelCost& cost,

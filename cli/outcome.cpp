@@ -96,17 +96,17 @@ std::string summary(const retarget::ReplayReport& report, const std::string& whe
   return where + text;
 }
 
-std::string failure(const retarget::Replay& run, const std::string& where, const std::string& motion_file) {
+std::string failure(const retarget::Replay& run, const std::string& where, const std::string& motion_file, const std::string& way_up) {
   const bool diverged = run.termination == physics::Termination::kDiverged;
   return one_line({where, "replay", diverged ? run.report.fall_cause : "the creature fell: " + run.report.fall_cause,
-                   motion_file + " shows it; try a higher --limit, more --nodes or a calmer clip"});
+                   motion_file + " shows it; " + (way_up.empty() ? "try a higher --limit, more --nodes or a calmer clip" : way_up)});
 }
 
 }  // namespace
 
-int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file) {
+int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file, const std::string& way_up) {
   if (is_down(run)) {
-    std::cerr << failure(run, where, motion_file) << std::endl;
+    std::cerr << failure(run, where, motion_file, way_up) << std::endl;
     return kShortOfTarget;
   }
   std::cout << summary(run.report, where) << "\n";
@@ -114,9 +114,9 @@ int tell_run(const retarget::Replay& run, const std::string& where, const std::s
 }
 
 int tell_report(const retarget::Replay& run, const std::string& where, const std::string& motion_file,
-                const retarget::RunReport& report) {
+                const retarget::RunReport& report, const std::string& way_up) {
   std::cout << io::report_json(report);
-  if (is_down(run)) std::cerr << failure(run, where, motion_file) << std::endl;
+  if (is_down(run)) std::cerr << failure(run, where, motion_file, way_up) << std::endl;
   return is_down(run) ? kShortOfTarget : kDone;
 }
 

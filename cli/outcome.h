@@ -29,9 +29,9 @@ void measure(const retarget::Performer& performer, const retarget::SignalSet& si
              retarget::RunReport& report);
 
 /// Last words of a command. Standard output gets one line of figures, or the report as JSON; standard error, where the run is down,
-/// one line with the cause. Returns the exit code.
-int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file);
+/// one line with the cause and with `way_up`, what to do then; empty: what goes for any creature. Returns the exit code.
+int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file, const std::string& way_up = "");
 int tell_report(const retarget::Replay& run, const std::string& where, const std::string& motion_file,
-                const retarget::RunReport& report);
+                const retarget::RunReport& report, const std::string& way_up = "");
 
 }  // namespace hydrostat::cli

@@ -9,6 +9,7 @@
 #include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
 #include "cli/level_option.h"
+#include "cli/level_trial.h"
 #include "cli/number_option.h"
 #include "cli/outcome.h"
 #include "cli/stages.h"
@@ -17,6 +18,7 @@
 #include "io/gltf_out.h"
 #include "io/load_creature.h"
 #include "io/trace_writer.h"
+#include "retarget/error.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
 
@@ -122,15 +124,21 @@ void put_in_scene(const ReplayCommand& command, io::LoadedCreature& creature) {
 /// Refuses a scene that cannot be before anything else is done.
 void check_scene(const ReplayCommand& command, io::LoadedCreature creature) { put_in_scene(command, creature); }
 
+/// Pushes are told as the scene has its axes.
+retarget::PerformOptions in_its_world(retarget::PerformOptions options, const retarget::Performer& performer) {
+  for (retarget::Push& push : options.replay.pushes) push.delta_v = performer.world.turn.transpose() * push.delta_v;
+  return options;
+}
+
 /// The motion alone, for -o.
 int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const io::Appearance& appearance,
-                 const retarget::Performances& performances) {
+                 const retarget::Performances& performances, const std::string& way_up) {
   const retarget::Replay& run = performances.main();
   const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
   const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, retarget::wobble_morphs(performer, run.motion));
   io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
                         performer.mesh, performer.scene.body.mass, retarget::in_world(performer.world, run.motion, 0), {});
-  return tell_run(run, command.directory, file.string());
+  return tell_run(run, command.directory, file.string(), way_up);
 }
 
 constexpr double kEnoughWay = 0.8;  // of the clip's travel
@@ -146,14 +154,27 @@ double way_kept(const retarget::Replay& run) {
 /// The levels that were asked for, one after the other in the creature's place; none where none were.
 class Levels {
  public:
-  Levels(const ReplayCommand& command, io::LoadedCreature& creature, const retarget::ReplayOptions& options, Stages& stages)
-      : command_(command), stages_(stages) {
+  Levels(const ReplayCommand& command, io::LoadedCreature& creature, const retarget::PerformOptions& options, Stages& stages)
+      : command_(command), stages_(stages), options_(options) {
     if (!command.level.is_asked()) return;
     solved_ = creature;
     rig_ = io::load_rig(command.directory, creature);
-    levels_ = stages.run("levels", [&] { return levels_within(command.level, kCommand, creature, rig_, options); });
-    if (levels_.front().work_ms == 0) options_ = options;
+    all_ = stages.run("levels", [&] { return levels_asked_among(command.level, kCommand, creature, rig_, options.replay); });
+    levels_ = levels_within(all_, command.level, kCommand);
+    is_costed_ = all_.front().work_ms > 0;
+    if (levels_.empty()) throw no_level_within(kCommand, budget_ms(command.level, kCommand), all_, trial_above(0));
     take(creature);
+  }
+  /// What to do where the creature is down on the level that was taken; empty where that is not known.
+  std::string way_up(const io::LoadedCreature& creature) {
+    if (levels_.empty()) return "";
+    try {
+      if (!is_costed_) all_ = retarget::level_costs(solved_.target.performer, rig_, io::level_options(solved_), options_.replay);
+    } catch (const Error&) {  // a level that was not asked for
+      return "";
+    }
+    const double taken_ms = creature.target.report.level->work_ms, budget = budget_ms(command_.level, kCommand);
+    return cli::way_up(trial_above(std::max(taken_ms, budget)), budget > 0);
   }
   /// Where the present one kept too little of the clip's way: the next coarser one, after the last the best of them, with a word on
   /// each that was left. False where there is none.
@@ -181,19 +202,36 @@ class Levels {
   }
   void take(io::LoadedCreature& creature) {
     creature = stages_.run("level", [&] { return at_level(solved_, rig_, levels_[taken_], command_.level, kCommand); });
-    retarget::LevelReport& report = *creature.target.report.level;
-    if (options_) {
-      const retarget::Performer& performer = creature.target.performer;
-      report.work_ms = retarget::frame_work_ms(performer.scene, performer.muscles.fields.cols(), *options_);
-    }
+    if (is_costed_) return;
+    const retarget::Performer& performer = creature.target.performer;
+    creature.target.report.level->work_ms = retarget::frame_work_ms(performer.scene, performer.muscles.fields.cols(), options_.replay);
+  }
+  LevelTrial trial_above(double work_ms) {
+    const auto keeps_way = [this](const retarget::LevelCost& level) {
+      try {
+        return way_kept(replay_of(level)) >= kEnoughWay;
+      } catch (const Error&) {  // no body or no plan on so few nodes
+        return false;
+      }
+    };
+    const int own_nodes = solved_.target.performer.mesh.node_count();
+    return stages_.run("other levels", [&] { return try_levels(all_, work_ms, own_nodes, options_.replay.duration_s, keeps_way); });
+  }
+  retarget::Replay replay_of(const retarget::LevelCost& level) const {
+    io::LoadedCreature creature = at_level(solved_, rig_, level, command_.level, kCommand);
+    put_in_scene(command_, creature);
+    retarget::PerformOptions options = in_its_world(options_, creature.target.performer);
+    options.baselines = options.replay.trace = false;
+    return retarget::perform_calmly(creature.target.performer, creature.signals, options).main();
   }
 
   const ReplayCommand& command_;
   Stages& stages_;
   io::LoadedCreature solved_;
   retarget::Rig rig_;
-  std::vector<retarget::LevelCost> levels_;
-  std::optional<retarget::ReplayOptions> options_;  // where the cost is not known yet
+  retarget::PerformOptions options_;
+  std::vector<retarget::LevelCost> all_, levels_;  // those to be tried among all
+  bool is_costed_ = false;
   std::size_t taken_ = 0;
   std::vector<double> ways_;  // of the levels tried, see way_kept
 };
@@ -236,7 +274,7 @@ int replay(const ReplayCommand& command) {
   retarget::PerformOptions options = perform_options(command, creature);
   const WobbleChoice wobble(command.wobble, command.level.is_asked(), command.directory, creature);
   check_scene(command, creature);
-  Levels levels(command, creature, options.replay, stages);
+  Levels levels(command, creature, options, stages);
   wobble.plan(creature.target.performer);
   std::optional<ChosenStep> chosen;
   if (command.accuracy.is_asked()) {
@@ -244,7 +282,7 @@ int replay(const ReplayCommand& command) {
     take_steps(options.replay, chosen->setting);
   }
   put_in_scene(command, creature);  // levels and accuracy are of the flat ground
-  for (retarget::Push& push : options.replay.pushes) push.delta_v = performer.world.turn.transpose() * push.delta_v;
+  options = in_its_world(options, performer);
   std::optional<io::CreatureWriter> writer;
   if (command.out.empty()) writer.emplace(command.directory, io::CreatureWriter::Start::amended);
 
@@ -266,6 +304,7 @@ int replay(const ReplayCommand& command) {
     take_steps(options.replay, chosen->setting);
     performances = perform();
   }
+  const std::string way_up = is_down(performances.main()) ? levels.way_up(creature) : "";
   options.replay.corrector.effort *= performances.effort;
   std::vector<std::string>& warnings = creature.target.report.warnings;
   for (const std::string& warning : retarget::feedback_warnings(performances)) warnings.push_back(warning);
@@ -274,7 +313,7 @@ int replay(const ReplayCommand& command) {
   const bool is_met = !chosen || chosen->report.is_met();
   if (!command.json) tell_level(creature.target.report.level, command.directory);
   if (!writer) {
-    const int exit_code = write_motion(command, performer, creature.appearance, performances);
+    const int exit_code = write_motion(command, performer, creature.appearance, performances, way_up);
     if (chosen) tell_accuracy(*chosen, performer);
     if (is_met || exit_code != kDone) return exit_code;
     std::cerr << too_inaccurate(command.directory, told(*chosen)) << std::endl;
@@ -300,8 +339,8 @@ int replay(const ReplayCommand& command) {
   writer->commit();
   const retarget::Replay& run = performances.main();
   const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();
-  const int exit_code =
-      command.json ? tell_report(run, command.directory, motion_file, report) : tell_run(run, command.directory, motion_file);
+  const int exit_code = command.json ? tell_report(run, command.directory, motion_file, report, way_up)
+                                     : tell_run(run, command.directory, motion_file, way_up);
   if (!command.json) std::cout << saved_words(report);
   if (is_met || exit_code != kDone) return exit_code;
   std::cerr << too_inaccurate(command.directory, report.accuracy) << std::endl;

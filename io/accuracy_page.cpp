@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "io/label_places.h"
 #include "io/svg_text.h"
 
 namespace hydrostat::io {
@@ -14,6 +15,7 @@ namespace {
 
 // Layout of the diagram [px].
 constexpr double kWidth = 760, kHeight = 470, kLeft = 70, kRight = 150, kTop = 62, kBottom = 50;
+constexpr double kMark = 6, kRing = 11;  // half of a point or cross, and of the ring around the recommended one
 
 std::string percent(double share) { return short_number(100 * share) + " %"; }
 
@@ -149,6 +151,52 @@ std::string accuracy_csv(const AccuracyCurve& curve) {
 
 namespace {
 
+constexpr Box kPlot{kLeft, kTop, kWidth - kRight, kHeight - kBottom};
+
+/// Methods in the order of the rows.
+std::vector<std::string> methods_of(const AccuracyCurve& curve) {
+  std::vector<std::string> methods;
+  for (const AccuracyRow& row : curve.rows) {
+    if (row.stable && std::find(methods.begin(), methods.end(), row.method) == methods.end()) methods.push_back(row.method);
+  }
+  return methods;
+}
+
+std::string legend(const std::vector<std::string>& methods, LabelPlaces& places) {
+  const std::string left = short_number(kWidth - kRight + 14);
+  double line = kTop + 14;
+  std::string svg;
+  const auto add = [&](const std::string& colour, const std::string& text) {
+    svg += "<text x=\"" + left + "\" y=\"" + short_number(line) + "\" fill=\"" + colour + "\">" + text + "</text>\n";
+    line += 16;
+  };
+  for (const std::string& method : methods) add(colour_of(method), "&#9679; " + method);
+  add("#666", "&#9679; tets, triangles");
+  add("#666", "&#9675; hexahedra, quads");
+  places.take({kWidth - kRight, kTop, kWidth, line});
+  return svg;
+}
+
+std::string floor_line(double y, LabelPlaces& places) {
+  const std::string at = short_number(y, 5), text = "the reference's own";
+  const double left = kWidth - kRight + 4, width = label_width(text.size());
+  const auto place = places.place(left + width / 2, y, width, {left, kTop, kWidth, kHeight - kBottom + kLabelHeight});
+  return "<line x1=\"" + short_number(kLeft) + "\" x2=\"" + short_number(kWidth - kRight) + "\" y1=\"" + at + "\" y2=\"" + at +
+         "\" stroke=\"#c33\" stroke-dasharray=\"4 3\"/><text x=\"" + short_number(left) + "\" y=\"" +
+         short_number((place ? place->second : y) + 4, 5) + "\" fill=\"#c33\">" + text + "</text>\n";
+}
+
+/// A cross where a row would be that falls, and beside it, where there is room, what it is.
+std::string fallen(const AccuracyRow& row, double x, double y, LabelPlaces& places) {
+  const std::string text = std::to_string(row.nodes) + " nodes: falls";
+  std::string svg = "<g><title>" + escaped(name_of(row)) + ": falls</title>" + cross(x, y);
+  if (const auto place = places.place(x, y - kLabelHeight, label_width(text.size()), kPlot)) {
+    svg += "<text x=\"" + short_number(place->first, 5) + "\" y=\"" + short_number(place->second + 4, 5) +
+           "\" text-anchor=\"middle\" fill=\"#c33\">" + text + "</text>";
+  }
+  return svg + "</g>\n";
+}
+
 /// `has_links`: every point leads to `#row<n>`.
 std::string diagram(const AccuracyCurve& curve, bool has_links) {
   Axis x(kLeft, kWidth - kRight), y(kHeight - kBottom, kTop);
@@ -168,12 +216,9 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
       "</text>\n<text x=\"" + short_number(kLeft) + "\" y=\"38\">" + escaped(sentence(curve)) + "</text>\n<text x=\"" +
       short_number(kLeft) + "\" y=\"53\">" + second_sentence(curve) + "</text>\n";
   svg += grid(x, y, curve.is_counted);
-  if (curve.floor > 0) {
-    svg += "<line x1=\"" + short_number(kLeft) + "\" x2=\"" + short_number(kWidth - kRight) + "\" y1=\"" + short_number(y.at(curve.floor), 5) +
-           "\" y2=\"" + short_number(y.at(curve.floor), 5) + "\" stroke=\"#c33\" stroke-dasharray=\"4 3\"/><text x=\"" +
-           short_number(kWidth - kRight + 4) + "\" y=\"" + short_number(y.at(curve.floor) + 4, 5) +
-           "\" fill=\"#c33\">the reference's own</text>\n";
-  }
+  LabelPlaces places;
+  svg += legend(methods_of(curve), places);
+  if (curve.floor > 0) svg += floor_line(y.at(curve.floor), places);
   const std::vector<bool> front = retarget::pareto_front(curve.rows, time);
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
@@ -186,15 +231,15 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
     line += short_number(x.at(curve.rows[k].*time), 5) + "," + short_number(y.at(curve.rows[k].error_rel_length), 5) + " ";
   }
   svg += "<polyline fill=\"none\" stroke=\"#000\" stroke-opacity=\"0.5\" points=\"" + line + "\"/>\n";
-  std::vector<std::string> methods;
   for (std::size_t k = 0; k < curve.rows.size(); ++k) {
     const AccuracyRow& row = curve.rows[k];
-    if (row.falls) {
-      svg += "<text x=\"" + short_number(x.at(row.*time), 5) + "\" y=\"" + short_number(y.at(row.error_rel_length) + 4, 5) +
-             "\" text-anchor=\"middle\" fill=\"#c33\">&#215; " + std::to_string(row.nodes) + " nodes: falls</text>\n";
-    }
+    const double left = x.at(row.*time), top = y.at(row.error_rel_length), half = static_cast<int>(k) == curve.recommended ? kRing : kMark;
+    if (row.stable || row.falls) places.take({left - half, top - half, left + half, top + half});
+  }
+  for (std::size_t k = 0; k < curve.rows.size(); ++k) {
+    const AccuracyRow& row = curve.rows[k];
+    if (row.falls) svg += fallen(row, x.at(row.*time), y.at(row.error_rel_length), places);
     if (!row.stable) continue;
-    if (std::find(methods.begin(), methods.end(), row.method) == methods.end()) methods.push_back(row.method);
     const std::string at =
         "cx=\"" + short_number(x.at(row.*time), 5) + "\" cy=\"" + short_number(y.at(row.error_rel_length), 5) + "\"";
     svg += (has_links ? "<a href=\"#row" + std::to_string(k) + "\">" : std::string("<g>")) + "<title>" +
@@ -207,14 +252,6 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
            "\" stroke-width=\"1.5\" fill=\"" + (is_box ? "#fff" : colour_of(row.method)) + "\" fill-opacity=\"" +
            (front[k] ? "1" : "0.5") + "\"/>" + (row.is_refused ? cross(x.at(row.*time), y.at(row.error_rel_length)) : "") + (has_links ? "</a>\n" : "</g>\n");
   }
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    svg += "<text x=\"" + short_number(kWidth - kRight + 14) + "\" y=\"" + short_number(kTop + 14 + 16 * static_cast<double>(m)) +
-           "\" fill=\"" + colour_of(methods[m]) + "\">&#9679; " + methods[m] + "</text>\n";
-  }
-  const double below = kTop + 30 + 16 * static_cast<double>(methods.size());
-  svg += "<text x=\"" + short_number(kWidth - kRight + 14) + "\" y=\"" + short_number(below) +
-         "\" fill=\"#666\">&#9679; tets, triangles</text><text x=\"" + short_number(kWidth - kRight + 14) + "\" y=\"" +
-         short_number(below + 16) + "\" fill=\"#666\">&#9675; hexahedra, quads</text>\n";
   return svg + "</svg>\n";
 }
 

@@ -1,10 +1,8 @@
 #include "io/path_file.h"
 
 #include <cmath>
-#include <stdexcept>
 
-#include "io/record_archive.h"
-#include "retarget/error.h"
+#include "io/packed_result.h"
 
 namespace hydrostat::io {
 namespace {
@@ -32,6 +30,12 @@ void name_path(RecordArchive& archive, retarget::NominalPath& path, retarget::Po
                  report.correction_rms_after, "open_loop_before", report.open_loop_s_before, "open_loop_after", report.open_loop_s_after);
 }
 
+struct ToldPath {
+  retarget::NominalPath path;
+  retarget::PolishReport report;
+};
+void name_told_path(RecordArchive& archive, ToldPath& told) { name_path(archive, told.path, told.report); }
+
 void name_fields(RecordArchive& archive, retarget::Polished& polished) {
   name_path(archive, polished.path, polished.report);
   name_spectrum(archive, "activation", polished.signals.activation);
@@ -47,47 +51,25 @@ bool is_sound(const retarget::Motion& offset, const retarget::Motion& target) {
 
 template <>
 Record record_of(const retarget::Polished& polished) {
-  Record record;
-  RecordArchive archive = RecordArchive::saving_to(record);
-  retarget::Polished copy = polished;  // the archive takes what it may also load
-  name_fields(archive, copy);
-  return record;
+  return record_by(name_fields, polished);
 }
 
 template <>
 retarget::Polished result_of(const Record& record) {
-  retarget::Polished polished;
-  RecordArchive archive = RecordArchive::loading_from(record);
-  name_fields(archive, polished);
-  return polished;
+  return value_by<retarget::Polished>(name_fields, record);
 }
 
 std::string path_bytes(const PerformedTarget& target) {
-  Record record;
-  RecordArchive archive = RecordArchive::saving_to(record);
-  retarget::NominalPath path = target.performer.path;
-  retarget::PolishReport report = *target.report.polish;
-  name_path(archive, path, report);
-  return packed(record, kTitle, kVersion);
+  return packed(record_by(name_told_path, ToldPath{target.performer.path, *target.report.polish}), kTitle, kVersion);
 }
 
 void parse_path(const std::string& bytes, const std::string& file, PerformedTarget& target) {
-  const char* const mend = "Make the creature again with 'hydrostat convert'.";
-  const Error damaged(file, "", "is damaged or of another version", mend);
-  const std::optional<Record> record = unpacked(bytes, kTitle, kVersion);
-  if (!record) throw damaged;
-  retarget::NominalPath path;
-  retarget::PolishReport report;
-  try {
-    RecordArchive archive = RecordArchive::loading_from(*record);
-    name_path(archive, path, report);
-  } catch (const std::out_of_range&) {
-    throw damaged;
-  }
+  ToldPath told = read_packed(bytes, file, kTitle, kVersion,
+                              [](const Record& record) { return value_by<ToldPath>(name_told_path, record); });
   const retarget::Motion& motion = target.performer.prepared.target;
-  if (!is_sound(path.place, motion) || !is_sound(path.velocity, motion)) throw Error(file, "", "does not belong to target.bin", mend);
-  target.performer.path = std::move(path);
-  target.report.polish = report;
+  if (!is_sound(told.path.place, motion) || !is_sound(told.path.velocity, motion)) throw not_of("target.bin", file);
+  target.performer.path = std::move(told.path);
+  target.report.polish = told.report;
 }
 
 }  // namespace hydrostat::io

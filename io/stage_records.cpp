@@ -2,9 +2,8 @@
 
 #include <stdexcept>
 
-#include "io/record_archive.h"
+#include "io/packed_result.h"
 #include "physics/element_body.h"
-#include "retarget/error.h"
 
 namespace hydrostat::io {
 namespace {
@@ -312,16 +311,7 @@ HYDROSTAT_RECORD(retarget::MovingMorphs)
 std::string rig_bytes(const retarget::Rig& rig) { return packed(record_of(rig), kRigTitle, kRigVersion); }
 
 retarget::Rig parse_rig(const std::string& bytes, const std::string& file, Eigen::Index nodes, Eigen::Index vertices) {
-  const char* const mend = "Make the creature again with 'hydrostat convert'.";
-  const Error damaged(file, "", "is damaged or of another version", mend);
-  const std::optional<Record> record = unpacked(bytes, kRigTitle, kRigVersion);
-  if (!record) throw damaged;
-  retarget::Rig rig;
-  try {
-    rig = result_of<retarget::Rig>(*record);
-  } catch (const std::out_of_range&) {
-    throw damaged;
-  }
+  retarget::Rig rig = read_packed(bytes, file, kRigTitle, kRigVersion, result_of<retarget::Rig>);
   const Eigen::Index bones = rig.skeleton.count();
   bool fits = rig.bone_weights.cols() == nodes && rig.bone_weights.rows() == bones && rig.skin.vertices.cols() == vertices &&
               rig.skin.triangles.size() > 0 && rig.skin.triangles.minCoeff() >= 0 &&
@@ -334,21 +324,14 @@ retarget::Rig parse_rig(const std::string& bytes, const std::string& file, Eigen
   for (std::size_t v = 0; fits && v < rig.skin.skin_weights.size(); ++v) {
     for (const auto& influence : rig.skin.skin_weights[v]) fits = fits && influence.bone >= 0 && influence.bone < bones;
   }
-  if (!fits) throw Error(file, "", "does not belong to body.json", mend);
+  if (!fits) throw not_of("body.json", file);
   return rig;
 }
 
 std::string target_bytes(const PerformedTarget& target) { return packed(record_of(target), kTargetTitle, kTargetVersion); }
 
 PerformedTarget parse_target(const std::string& bytes, const std::string& file) {
-  const Error damaged(file, "", "is damaged or of another version", "Make the creature again with 'hydrostat convert'.");
-  const std::optional<Record> record = unpacked(bytes, kTargetTitle, kTargetVersion);
-  if (!record) throw damaged;
-  try {
-    return result_of<PerformedTarget>(*record);
-  } catch (const std::out_of_range&) {
-    throw damaged;
-  }
+  return read_packed(bytes, file, kTargetTitle, kTargetVersion, result_of<PerformedTarget>);
 }
 
 namespace {
@@ -383,19 +366,12 @@ std::string appearance_bytes(const Appearance& appearance) {
 }
 
 Appearance parse_appearance(const std::string& bytes, const std::string& file, Eigen::Index vertices) {
-  const Error damaged(file, "", "is damaged or of another version", "Make the creature again with 'hydrostat convert'.");
-  const std::optional<Record> record = unpacked(bytes, kAppearanceTitle, kAppearanceVersion);
-  if (!record) throw damaged;
-  try {
-    Appearance appearance = result_of<Appearance>(*record);
-    bool sound = true;
-    for (const Appearance::Part& part : appearance.parts) sound = sound && fits(part, appearance, vertices);
-    for (const Material& material : appearance.materials) sound = sound && fits(material, appearance);
-    if (sound) return appearance;
-  } catch (const std::out_of_range&) {
-    throw damaged;
-  }
-  throw Error(file, "", "does not belong to body.json", "Make the creature again with 'hydrostat convert'.");
+  Appearance appearance = read_packed(bytes, file, kAppearanceTitle, kAppearanceVersion, result_of<Appearance>);
+  bool sound = true;
+  for (const Appearance::Part& part : appearance.parts) sound = sound && fits(part, appearance, vertices);
+  for (const Material& material : appearance.materials) sound = sound && fits(material, appearance);
+  if (!sound) throw not_of("body.json", file);
+  return appearance;
 }
 
 std::string morphs_bytes(const retarget::MovingMorphs& morphs) {
@@ -403,21 +379,13 @@ std::string morphs_bytes(const retarget::MovingMorphs& morphs) {
 }
 
 retarget::MovingMorphs parse_morphs(const std::string& bytes, const std::string& file, Eigen::Index vertices) {
-  const Error damaged(file, "", "is damaged or of another version", "Make the creature again with 'hydrostat convert'.");
-  const std::optional<Record> record = unpacked(bytes, kMorphsTitle, kMorphsVersion);
-  if (!record) throw damaged;
-  try {
-    retarget::MovingMorphs morphs = result_of<retarget::MovingMorphs>(*record);
-    bool sound = morphs.rate_hz > 0 && morphs.weights.cols() > 0 && morphs.weights.allFinite() &&
-                 morphs.weights.rows() == static_cast<Eigen::Index>(morphs.targets.size());
-    for (const retarget::MorphTarget& morph : morphs.targets)
-      sound = sound && are_in(morph.vertices, vertices) && morph.offsets.cols() == morph.vertices.size() &&
-              morph.offsets.allFinite();
-    if (sound) return morphs;
-  } catch (const std::out_of_range&) {
-    throw damaged;
-  }
-  throw Error(file, "", "does not belong to body.json", "Make the creature again with 'hydrostat convert'.");
+  retarget::MovingMorphs morphs = read_packed(bytes, file, kMorphsTitle, kMorphsVersion, result_of<retarget::MovingMorphs>);
+  bool sound = morphs.rate_hz > 0 && morphs.weights.cols() > 0 && morphs.weights.allFinite() &&
+               morphs.weights.rows() == static_cast<Eigen::Index>(morphs.targets.size());
+  for (const retarget::MorphTarget& morph : morphs.targets)
+    sound = sound && are_in(morph.vertices, vertices) && morph.offsets.cols() == morph.vertices.size() && morph.offsets.allFinite();
+  if (!sound) throw not_of("body.json", file);
+  return morphs;
 }
 
 }  // namespace hydrostat::io

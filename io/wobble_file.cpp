@@ -1,9 +1,6 @@
 #include "io/wobble_file.h"
 
-#include <stdexcept>
-
-#include "io/record_archive.h"
-#include "retarget/error.h"
+#include "io/packed_result.h"
 
 namespace hydrostat::io {
 namespace {
@@ -29,35 +26,19 @@ bool is_sound(const retarget::Wobble& wobble, const retarget::Performer& perform
 
 template <>
 Record record_of(const retarget::Wobble& wobble) {
-  Record record;
-  RecordArchive archive = RecordArchive::saving_to(record);
-  retarget::Wobble copy = wobble;  // the archive takes what it may also load
-  name_fields(archive, copy);
-  return record;
+  return record_by(name_fields, wobble);
 }
 
 template <>
 retarget::Wobble result_of(const Record& record) {
-  retarget::Wobble wobble;
-  RecordArchive archive = RecordArchive::loading_from(record);
-  name_fields(archive, wobble);
-  return wobble;
+  return value_by<retarget::Wobble>(name_fields, record);
 }
 
 std::string wobble_bytes(const retarget::Wobble& wobble) { return packed(record_of(wobble), kTitle, kVersion); }
 
 retarget::Wobble parse_wobble(const std::string& bytes, const std::string& file, const retarget::Performer& performer) {
-  const char* const mend = "Make the creature again with 'hydrostat convert'.";
-  const Error damaged(file, "", "is damaged or of another version", mend);
-  const std::optional<Record> record = unpacked(bytes, kTitle, kVersion);
-  if (!record) throw damaged;
-  retarget::Wobble wobble;
-  try {
-    wobble = result_of<retarget::Wobble>(*record);
-  } catch (const std::out_of_range&) {
-    throw damaged;
-  }
-  if (!is_sound(wobble, performer)) throw Error(file, "", "does not belong to body.json", mend);
+  retarget::Wobble wobble = read_packed(bytes, file, kTitle, kVersion, result_of<retarget::Wobble>);
+  if (!is_sound(wobble, performer)) throw not_of("body.json", file);
   return wobble;
 }
 

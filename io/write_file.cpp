@@ -10,13 +10,13 @@
 #include <iterator>
 #include <system_error>
 
-#include "retarget/error.h"
+#include "io/write_error.h"
 
 namespace hydrostat::io {
 
 namespace {
 
-Error write_error(const std::filesystem::path& shown_as, int error_number) {
+WriteError write_error(const std::filesystem::path& shown_as, int error_number) {
   return {shown_as.string(), "", std::string("cannot be written: ") + std::strerror(error_number),
           mend_of_write_error(error_number)};
 }

@@ -24,7 +24,9 @@ ImpulseContact<Dim>::ImpulseContact(const SceneOf<Dim>& scene)
 template <int Dim>
 void ImpulseContact<Dim>::find_candidates(double farther, const StateOf<Dim>& state) {
   reach_ = kReach * shortest_edge_;
+  const bool had_none = set_.candidates().empty();
   set_.find(state, reach_ + farther);
+  if (had_none && set_.candidates().empty()) return;
   std::fill(is_candidate_.begin(), is_candidate_.end(), 0);
   for (const ContactOf<Dim>& contact : set_.candidates()) is_candidate_[static_cast<std::size_t>(contact.slot)] = 1;
   for (std::size_t s = 0; s < is_candidate_.size(); ++s) {
@@ -82,6 +84,11 @@ void ImpulseContact<Dim>::push_apart(double h, double fastest, StateOf<Dim>& sta
   const double farthest = 2 * h * fastest + h * (push_out_speed_ + set_.fastest_obstacle());
   reach_ -= farthest;
   if (reach_ < 0) find_candidates(farthest, state);
+  if (set_.candidates().empty()) {
+    active_.clear();
+    set_.move_obstacles(h, state.obstacle_travel);
+    return;
+  }
   gather_active(h, state);
   for (int k = 0; k < kSweeps; ++k) {
     if (sweep(state) < kTolerance) break;

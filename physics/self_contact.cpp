@@ -13,7 +13,28 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLookedFor = 0.25;  // of the shortest edge [-]: how near to its faces depth is asked for
 constexpr double kSpareReach = 0.2;  // of the shortest edge [-]
+constexpr double kFarthestApart = 3;  // shortest edges [-]
 constexpr int kUsualPartners = 24;   // of a place
+
+/// The farthest that two nodes have moved against each other along one axis [m].
+template <int Dim>
+double spread(const PointsOf<Dim>& x, const PointsOf<Dim>& from) {
+  constexpr int kWide = 4;
+  Eigen::Array<double, Dim, kWide> low, high;
+  low.setConstant(kInfinity);
+  high = -low;
+  Eigen::Index i = 0;
+  for (; i + kWide <= x.cols(); i += kWide) {
+    const Eigen::Array<double, Dim, kWide> moved = x.template middleCols<kWide>(i) - from.template middleCols<kWide>(i);
+    low = low.min(moved);
+    high = high.max(moved);
+  }
+  for (; i < x.cols(); ++i) {
+    low.col(0) = low.col(0).min((x.col(i) - from.col(i)).array());
+    high.col(0) = high.col(0).max((x.col(i) - from.col(i)).array());
+  }
+  return (high.rowwise().maxCoeff() - low.rowwise().minCoeff()).maxCoeff();
+}
 
 }  // namespace
 
@@ -43,6 +64,7 @@ SelfContactSet<Dim>::SelfContactSet(const SceneOf<Dim>& scene) : scene_(scene) {
   partner_end_.assign(places, 0);
   partners_.reserve(kUsualPartners * places);
   spare_reach_ = kSpareReach * scene.body.rest_length.minCoeff();
+  farthest_apart_ = kFarthestApart * scene.body.rest_length.minCoeff();
   overlaps_.resize(points_.size());
   crossed_.assign(edges_.size(), -1);
 }
@@ -69,59 +91,93 @@ bool SelfContactSet<Dim>::may_touch(int node, const int* nodes, int count) const
   return meets;
 }
 
-/// Of a place: what stands within `distance` of it.
+/// Calls use(partner, gap) for what may touch a place and whose box is within `distance` of its own; gap [m] is how far apart
+/// they are along the axis on which that is most.
 template <int Dim>
-void SelfContactSet<Dim>::gather_partners(const PointsOf<Dim>& x, int place, double distance) {
+template <typename Use>
+void SelfContactSet<Dim>::visit_partners(const PointsOf<Dim>& x, int place, double distance, const Use& use) const {
   const auto p = static_cast<std::size_t>(place), points = points_.size();
-  partner_begin_[p] = static_cast<int>(partners_.size());
+  VectorOf<Dim> low, high;
+  const auto gap = [&](const auto& other_low, const auto& other_high) {
+    return distance + (other_low - high).cwiseMax(low - other_high).maxCoeff();
+  };
   if (p < points) {
     const int node = points_[p];
-    const VectorOf<Dim> low = x.col(node).array() - distance, high = x.col(node).array() + distance;
+    low = x.col(node).array() - distance;
+    high = x.col(node).array() + distance;
     face_tree_.visit(low, high, [&](int f) {
       if ((face_low_.col(f).array() > high.array()).any() || (face_high_.col(f).array() < low.array()).any()) return;
-      if (may_touch(node, faces_.col(f).data(), Dim)) partners_.push_back(f);
+      if (may_touch(node, faces_.col(f).data(), Dim)) use(f, gap(face_low_.col(f), face_high_.col(f)));
     });
-  } else {
-    const auto e = static_cast<int>(p - points);
-    const Eigen::Vector2i ends = edges_[static_cast<std::size_t>(e)].nodes;
-    const VectorOf<Dim> low = x.col(ends[0]).cwiseMin(x.col(ends[1])).array() - distance;
-    const VectorOf<Dim> high = x.col(ends[0]).cwiseMax(x.col(ends[1])).array() + distance;
-    face_tree_.visit(low, high, [&](int f) {
-      for (int o = std::max(e + 1, edge_begin_[static_cast<std::size_t>(f)]);
-           o < edge_begin_[static_cast<std::size_t>(f) + 1]; ++o) {
-        const Eigen::Vector2i other = edges_[static_cast<std::size_t>(o)].nodes;
-        if ((x.col(other[0]).cwiseMin(x.col(other[1])).array() > high.array()).any() ||
-            (x.col(other[0]).cwiseMax(x.col(other[1])).array() < low.array()).any()) {
-          continue;
-        }
-        if (may_touch(ends[0], other.data(), 2) && may_touch(ends[1], other.data(), 2)) partners_.push_back(o);
-      }
-    });
+    return;
   }
-  partner_end_[p] = static_cast<int>(partners_.size());
+  const auto e = static_cast<int>(p - points);
+  const Eigen::Vector2i ends = edges_[static_cast<std::size_t>(e)].nodes;
+  low = x.col(ends[0]).cwiseMin(x.col(ends[1])).array() - distance;
+  high = x.col(ends[0]).cwiseMax(x.col(ends[1])).array() + distance;
+  face_tree_.visit(low, high, [&](int f) {
+    for (int o = std::max(e + 1, edge_begin_[static_cast<std::size_t>(f)]); o < edge_begin_[static_cast<std::size_t>(f) + 1]; ++o) {
+      const Eigen::Vector2i other = edges_[static_cast<std::size_t>(o)].nodes;
+      const VectorOf<Dim> other_low = x.col(other[0]).cwiseMin(x.col(other[1]));
+      const VectorOf<Dim> other_high = x.col(other[0]).cwiseMax(x.col(other[1]));
+      if ((other_low.array() > high.array()).any() || (other_high.array() < low.array()).any()) continue;
+      if (may_touch(ends[0], other.data(), 2) && may_touch(ends[1], other.data(), 2)) use(o, gap(other_low, other_high));
+    }
+  });
 }
 
 template <int Dim>
 void SelfContactSet<Dim>::gather(const PointsOf<Dim>& x, double reach) {
+  ++searches_;
   for (Eigen::Index f = 0; f < faces_.cols(); ++f) {
     const BlockOf<Dim> corners = corners_of_face<Dim>(x, faces_.col(f));
     face_low_.col(f) = corners.rowwise().minCoeff();
     face_high_.col(f) = corners.rowwise().maxCoeff();
   }
   face_tree_.follow(face_low_, face_high_);
-  partners_.clear();
-  for (int place = 0; place < slot_count_; ++place) gather_partners(x, place, 2 * reach);
+  const bool stood_apart = apart_ > 0;
   gathered_at_ = x;
   gathered_reach_ = reach;
+  if (stood_apart) measure_apart(x);
+  if (stood_apart && apart_ > 2 * reach) return;  // the partners are none as before
+  partners_.clear();
+  for (int place = 0; place < slot_count_; ++place) {
+    const auto p = static_cast<std::size_t>(place);
+    partner_begin_[p] = static_cast<int>(partners_.size());
+    visit_partners(x, place, 2 * reach, [&](int partner, double) { partners_.push_back(partner); });
+    partner_end_[p] = static_cast<int>(partners_.size());
+  }
+  if (!partners_.empty()) {
+    apart_ = 0;
+  } else if (!stood_apart) {
+    measure_apart(x);
+  }
+}
+
+template <int Dim>
+void SelfContactSet<Dim>::measure_apart(const PointsOf<Dim>& x) {
+  apart_ = farthest_apart_;
+  for (int place = 0; place < slot_count_; ++place) {
+    visit_partners(x, place, apart_, [&](int, double gap) { apart_ = std::min(apart_, gap); });
+  }
+}
+
+/// Whether the body touches nothing of itself, and gathering for `reach` would bring no partners: boxes that stand apart along
+/// an axis come nearer to each other along it by no more than nodes move against each other.
+template <int Dim>
+bool SelfContactSet<Dim>::stands_apart(const PointsOf<Dim>& x, double reach) const {
+  const double spare = apart_ - 2 * (reach + spare_reach_);
+  return spare > 0 && !starts_unknown_ && !overlaps_itself_ && spread<Dim>(x, gathered_at_) <= spare;
 }
 
 template <int Dim>
 void SelfContactSet<Dim>::find(const PointsOf<Dim>& x, double reach, int first_slot,
                                std::vector<ContactOf<Dim>>& candidates) {
+  if (stands_apart(x, reach)) return;
   double moved = 0;
   if (gathered_reach_ >= 0) moved = std::sqrt((x - gathered_at_).colwise().squaredNorm().maxCoeff());
   if (!(moved + reach <= gathered_reach_)) gather(x, reach + spare_reach_);
-  tets_follow_ = false;
+  tets_follow_ = overlaps_itself_ = false;
   ContactOf<Dim> contact{};
   contact.surface = ContactOf<Dim>::kItself;
   for (int place = 0; place < slot_count_; ++place) {
@@ -135,6 +191,7 @@ void SelfContactSet<Dim>::find(const PointsOf<Dim>& x, double reach, int first_s
     if (may_overlap || (is_point && contact.gap < 0)) {
       find_overlap(x, place);
       update(x, contact);
+      overlaps_itself_ = overlaps_itself_ || overlaps_[p].face >= 0;
     }
     if (!is_point) crossed_[p - points_.size()] = contact.gap < kInfinity ? contact.points[0] : -1;
     // What faces nothing now may do so after a turn.

@@ -26,7 +26,11 @@ class SelfContactSet {
   int slot_count() const { return slot_count_; }
   /// Adds to `candidates`, from `first_slot` on, the places that may come to touch while no node moves more than `reach`
   /// [m]. Takes memory only where places have more neighbours than ever before. What is near is gathered somewhat farther
-  /// out and kept until the nodes have moved that far.
+  /// out and kept until the nodes have moved that far. Where nothing is near, it is measured how far apart all stands, and
+  /// nothing is looked for until the nodes have moved that far against each other: what the body does as a whole counts for
+  /// nothing. No motion hangs on that.
+  /// Source: Verlet, "Computer experiments on classical fluids I", Phys. Rev. 159, 1967, for lists that are kept; Mirtich,
+  /// "Timewarp rigid body simulation", SIGGRAPH 2000, section 4, for distances that put off the next look.
   void find(const PointsOf<Dim>& x, double reach, int first_slot, std::vector<ContactOf<Dim>>& candidates);
   /// Brings a candidate to `x`: its gap is infinite where it faces nothing.
   void update(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const;
@@ -35,6 +39,8 @@ class SelfContactSet {
   void forget() { starts_unknown_ = true; }
   /// How deep the body is in itself [m], 0 for not at all, as far as nodes and edges tell; to be asked in every step.
   double deepest(const PointsOf<Dim>& x);
+  /// How often the whole surface was looked through so far.
+  long searches() const { return searches_; }
 
  private:
   struct Edge {
@@ -50,8 +56,11 @@ class SelfContactSet {
   bool may_touch(int node, const int* nodes, int count) const;
   bool is_near(int a, int b) const;
   bool may_meet(int a, int b) const;
+  bool stands_apart(const PointsOf<Dim>& x, double reach) const;
   void gather(const PointsOf<Dim>& x, double reach);
-  void gather_partners(const PointsOf<Dim>& x, int place, double distance);
+  void measure_apart(const PointsOf<Dim>& x);
+  template <typename Use>
+  void visit_partners(const PointsOf<Dim>& x, int place, double distance, const Use& use) const;
   void find_overlap(const PointsOf<Dim>& x, int place);
   void face_node(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const;
   void face_edge(const PointsOf<Dim>& x, ContactOf<Dim>& contact) const;
@@ -77,7 +86,11 @@ class SelfContactSet {
   PointsOf<Dim> gathered_at_;                                // where the nodes stood when partners were gathered
   double gathered_reach_ = -1;                               // [m] as far as nodes may have moved since
   double spare_reach_ = 0;                                   // [m] beyond what is asked for
-  bool starts_unknown_ = true, tets_follow_ = false;
+  // [m] that the boxes of any two parts that may touch stood apart along some axis when partners were gathered; 0 where some had any
+  double apart_ = 0;
+  double farthest_apart_ = 0;  // [m] as far as that is of interest
+  long searches_ = 0;
+  bool starts_unknown_ = true, tets_follow_ = false, overlaps_itself_ = false;
 };
 
 }  // namespace hydrostat::physics

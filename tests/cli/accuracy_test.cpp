@@ -5,9 +5,12 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <regex>
 #include <sstream>
 
 #include "io/accuracy_page.h"
+#include "io/label_places.h"
 #include "tests/cli/run_program.h"
 #include "tests/sanitizers.h"
 
@@ -205,6 +208,66 @@ TEST_F(AccuracyCommands, AnEffectThatIsOffCostsNoInstruction) {
   io::write_file(directory.path / "seamed.toml", shape + seam + "\"on\"\n");
   EXPECT_NEAR(instructions(directory.path, "whole.toml"), plain, 1e-3 * plain);
   EXPECT_GT(instructions(directory.path, "seamed.toml"), 1.01 * plain);
+}
+
+/// The boxes of the picture's texts [px], as wide as letters of a usual font are, and of its points.
+struct PictureBoxes {
+  std::vector<io::Box> texts, points;
+};
+PictureBoxes boxes_of(const std::string& svg) {
+  PictureBoxes boxes;
+  const std::regex text("<text ([^>]*)>([^<]*)</text>"), entity("&[^;]*;"), circle("<circle cx=\"([^\"]*)\" cy=\"([^\"]*)\"");
+  for (std::sregex_iterator at(svg.begin(), svg.end(), text), end; at != end; ++at) {
+    const std::string attributes = (*at)[1], letters = std::regex_replace((*at)[2].str(), entity, "o");
+    const auto has = [&](const std::string& words) { return attributes.find(words) != std::string::npos; };
+    const auto number = [&](const std::string& name) {
+      const std::size_t begin = attributes.find(name + "=\"");
+      return begin == std::string::npos ? 0 : std::stod(attributes.substr(begin + name.size() + 2));
+    };
+    if (has("transform")) continue;  // the title of the upright axis, along the edge
+    const double size = has("font-size") ? number("font-size") : 11, width = 0.55 * size * static_cast<double>(letters.size());
+    const double shift = has("middle") ? width / 2 : has("\"end\"") ? width : 0, left = number("x") - shift, base = number("y");
+    boxes.texts.push_back({left, base - 0.75 * size, left + width, base + 0.2 * size});
+  }
+  for (std::sregex_iterator at(svg.begin(), svg.end(), circle), end; at != end; ++at) {
+    const double x = std::stod((*at)[1]), y = std::stod((*at)[2]);
+    boxes.points.push_back({x - 4, y - 4, x + 4, y + 4});
+  }
+  return boxes;
+}
+
+TEST(AccuracyPicture, PrintsNoTextOverAnotherNorOverAPoint) {
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto any = [&](double least, double most) { return std::uniform_real_distribution<double>(least, most)(random); };
+    const double decades = seed % 3 == 0 ? 0.05 : any(0.2, 4);  // all in one place, or far apart
+    const int rows = 2 + static_cast<int>(seed % 24);
+    io::AccuracyCurve curve;
+    curve.floor = seed % 2 == 0 ? 0 : std::pow(10, any(-4, -1));
+    int falling = 0;
+    for (int k = 0; k < rows; ++k) {
+      retarget::AccuracyRow row;
+      row.method = std::vector<std::string>{"explicit", "implicit", "euler", "xpbd", "spring"}[random() % 5];
+      row.nodes = 10 + static_cast<int>(random() % 2000);
+      row.falls = k < 2 || random() % 3 == 0;
+      row.stable = !row.falls;
+      row.work_ms = row.ms_per_sim_s = 30 * std::pow(10, any(0, decades));
+      row.error_rel_length = row.error_rms_m = 0.01 * std::pow(10, any(-decades, 0));
+      if (k == 1) row = curve.rows[0];  // twice the same, by another step
+      falling += row.falls ? 1 : 0;
+      curve.rows.push_back(row);
+    }
+    const std::string svg = io::accuracy_svg(curve);
+    const PictureBoxes boxes = boxes_of(svg);
+    int told = 0;
+    for (std::size_t at = svg.find(" nodes: falls<"); at != std::string::npos; at = svg.find(" nodes: falls<", at + 1)) ++told;
+    EXPECT_EQ(told, falling);
+    for (std::size_t a = 0; a < boxes.texts.size(); ++a) {
+      for (std::size_t b = 0; b < a; ++b) EXPECT_FALSE(boxes.texts[a].meets(boxes.texts[b])) << svg;
+      for (const io::Box& point : boxes.points) EXPECT_FALSE(boxes.texts[a].meets(point)) << svg;
+    }
+  }
 }
 
 }  // namespace

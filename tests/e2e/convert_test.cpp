@@ -454,6 +454,15 @@ TEST(Convert, TakesACoarserMeshWhereItKeepsTheErrorAndRemembersIt) {
   EXPECT_EQ(motion_bytes(creature), motion);
   hydrostat_in(directory.path, "replay creature --quiet");
   EXPECT_EQ(motion_bytes(creature), motion);
+  // What cannot be written is told as such, and not taken for a mesh that cannot be solved.
+  const fs::path coarser = creature / "cache" / "coarser";
+  fs::remove_all(coarser);
+  io::write_file(coarser, "in the way");
+  const Outcome blocked = convert(directory.path, kSmallClip, "creature", "--max-error 4%");
+  EXPECT_EQ(blocked.exit_code, 1);
+  EXPECT_TRUE(blocked.err.starts_with("creature/cache/coarser")) << blocked.err;
+  EXPECT_NE(blocked.err.find("cannot be written"), std::string::npos) << blocked.err;
+  EXPECT_EQ(motion_bytes(creature), motion);
 }
 
 TEST(Convert, LeavesAnExistingCreatureAsItWasWhenTheDiskIsFull) {

@@ -65,8 +65,13 @@ TEST_F(Replay, OnOtherLevelsIsTheSameEachTimeAndRefusesWhatCannotBe) {
     const std::size_t begin = too_little.err.find(before) + before.size();
     return too_little.err.substr(begin, too_little.err.find(after, begin) - begin);
   };
-  const std::string nodes = told_between("the cheapest, of ", " nodes"), possible = told_between("Allow ", ".\n");
+  const std::string nodes = told_between("keeps its way, of ", " nodes"), possible = told_between("Allow ", ".\n");
   EXPECT_NE(level("--lod auto --budget " + possible, "cheap.glb").find("on " + nodes + " nodes"), std::string::npos) << too_little.err;
+  const Outcome fallen = replay("--duration 1 -o fallen.glb --lod auto --budget 1ms");
+  EXPECT_EQ(fallen.exit_code, 3) << fallen.out;
+  EXPECT_NE(fallen.err.find("keeps its way, of " + nodes + " nodes, takes "), std::string::npos) << fallen.err;
+  EXPECT_TRUE(fallen.err.ends_with(" a frame: give --budget " + possible + ".\n")) << fallen.err;
+  EXPECT_EQ(std::count(fallen.err.begin(), fallen.err.end(), '\n'), 1) << fallen.err;
   EXPECT_EQ(motion_bytes(creature_), motion);
   for (const char* options : {"--lod auto", "--lod 60 --budget 2ms", "--budget 2ms", "--lod 3", "--lod 60.5", "--lod auto --budget soon"})
     EXPECT_EQ(replay(options).exit_code, 2) << options;
@@ -173,6 +178,25 @@ TEST_F(Replay, InAWorldBooksAllThatActsOnTheBody) {
   EXPECT_LE(audit.angular_mgl, 1e-3);  // the moment of gravity is taken at the row's middle
   EXPECT_GT(audit.effect_mg, 0.05);
   EXPECT_EQ(audit.correction_ns, 0);
+}
+
+TEST_F(Replay, WithoutWeightOrGroundIsMovedByWhatIsLeftAlone) {
+  const std::string no_weight = "gravity_m_s2 = [0.0, 0.0, 0.0]\n", no_ground = "[effects]\nground = \"off\"\n", push = " --push t=0.1,dv=0.3:0.5:0";
+  const std::vector<std::pair<std::string, std::string>> runs{
+      {no_weight + no_ground, ""}, {no_weight + no_ground, push}, {no_ground, " --open-loop"}, {no_ground, push}, {no_weight, ""}};
+  for (const auto& [world, options] : runs) {
+    SCOPED_TRACE(world + options);
+    io::write_file(directory_.path / "world.toml", world);
+    const Outcome outcome = replay("-o motion.glb --trace trace --duration 0.3 --scene world.toml" + options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    const TraceAudit audit = audit_trace(directory_.path / "trace", creature_, {0, world == no_ground ? -9.81 : 0, 0});
+    EXPECT_NEAR(audit.duration_s, 0.3, 1e-9);
+    EXPECT_LE(audit.momentum_mg, 1e-9);
+    EXPECT_LE(audit.angular_mgl, world == no_ground ? 1e-3 : 1e-6);  // gravity's moment is taken at the row's middle
+    EXPECT_EQ(audit.effect_mg > 0, options == push);
+    EXPECT_EQ(audit.contact_mg > 0, world == no_weight);  // where there is ground it pushes from it
+    EXPECT_EQ(audit.correction_ns, 0);
+  }
 }
 
 TEST_F(Replay, GoesInTheSceneThatTheCreatureWasMadeWith) {

@@ -25,6 +25,7 @@ struct TraceAudit {
   double pull_mg = 0;           // contact force of a node toward the ground
   double loaded_height_m = -1e300;  // of the lowest contact point of a node that bears load, less the way it goes in the row
   double effect_mg = 0;         // sum of the effect forces
+  double contact_mg = 0;        // of a node
   double correction_ns = 0;     // largest correction impulse
 };
 
@@ -43,7 +44,8 @@ inline Eigen::Vector3d moment(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd&
 
 }  // namespace audit
 
-inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::filesystem::path& creature) {
+inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::filesystem::path& creature,
+                              const Eigen::Vector3d& gravity = {0, -9.81, 0}) {
   const auto read = [&](const char* name) { return io::read_npy_double(trace / name); };
   const auto time = read("time.npy"), mass = read("mass.npy"), position = read("position.npy"), velocity = read("velocity.npy"),
              contact = read("contact_force.npy"), effect = read("effect_force.npy"), correction = read("correction_impulse.npy"),
@@ -52,7 +54,6 @@ inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::fil
   const double length = body.at("length_m"), friction = body.at("friction");
   const Eigen::Map<const Eigen::VectorXd> m(mass.values.data(), static_cast<Eigen::Index>(mass.values.size()));
   const double total = m.sum();
-  const Eigen::Vector3d gravity(0, -9.81, 0);
   const double weight = total * 9.81;
   const Eigen::Index nodes = m.size();
   const nlohmann::json& point_nodes = body.at("contact_points").at("nodes");
@@ -86,6 +87,8 @@ inline TraceAudit audit_trace(const std::filesystem::path& trace, const std::fil
     found.angular_mgl = std::max(found.angular_mgl, (spin - by_gravity - by_contact - by_effect).norm() / (weight * length));
     found.moment_mgl = std::max(found.moment_mgl, (audit::moment(middle, f) - by_contact).norm() / (weight * length));
     found.effect_mg = std::max(found.effect_mg, e.rowwise().sum().norm() / weight);
+
+    found.contact_mg = std::max(found.contact_mg, f.colwise().norm().maxCoeff() / weight);
 
     Eigen::VectorXd height = Eigen::VectorXd::Constant(nodes, 1e300);  // of the lowest point that hangs on a node
     for (std::size_t p = 0; p < point_nodes.size(); ++p) {

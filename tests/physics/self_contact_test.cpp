@@ -269,5 +269,132 @@ TEST(SelfContactSets, FindNothingInABodyThatIsOnlyStrained) {
   expect_nothing(whole, random);
 }
 
+//   +---+ ... +---+      +---+  +---+
+//   |    bends    |      |   held   |   a bar, and two cells of the same body that are held, a cell apart
+//   +---+ ... +---+      +---+  +---+
+constexpr double kExact = 0.125;  // [m], so that the held cells stand unstrained wherever they are
+constexpr int kBar = 16;          // cells
+template <int Dim>
+SceneOf<Dim> bar_beside_two_cells() {
+  const auto keep = [](int i, int j, int) { return i < kBar || (j == 0 && (i == kBar + 8 || i == kBar + 10)); };
+  SceneOf<Dim> scene = in_the_air(body_of(make_lattice<Dim>(kBar + 11, 2, 1, kExact, keep), {1000, 2e5, 4, 0.01}), false);
+  for (int i = 0; i < scene.body.node_count(); ++i) {
+    if (scene.body.rest(0, i) > (kBar + 1) * kExact) scene.body.held.push_back(i);
+  }
+  scene.self_contact.is_on = true;
+  return scene;
+}
+template <int Dim>
+Eigen::VectorXd curl(const BodyOf<Dim>& body, double strength) {
+  Eigen::VectorXd activation = passive(body);
+  for (int e = 0; e < body.edge_count(); ++e) {
+    const VectorOf<Dim> a = body.rest.col(body.edges(0, e)), b = body.rest.col(body.edges(1, e));
+    if (a.x() > (kBar + 1) * kExact) continue;
+    activation[e] += strength * (1 - a.x() / (2 * kBar * kExact)) * ((a + b).y() / (2 * kExact) - 1) * std::pow((b - a).normalized().x(), 2);
+  }
+  return activation;
+}
+
+METHOD_TEST(SelfContacts, MoveNoBitOtherwiseWhereSomethingElseIsNear) {
+  const SceneOf<Dim> scene = bar_beside_two_cells<Dim>();
+  double touched = 0;
+  for (unsigned seed = 0; seed < trials(Dim == 3 ? 2u : 3u); ++seed) {
+    std::mt19937 random(seed);
+    StateOf<Dim> alone{scene.body.rest, random_points<Dim>(random, scene.body.node_count(), 0.5)};
+    for (const int i : scene.body.held) alone.v.col(i).setZero();
+    StateOf<Dim> beside = alone;  // here the two keep the body looking at itself in every step
+    for (const int i : scene.body.held) {
+      if (scene.body.rest(0, i) > (kBar + 9.5) * kExact) beside.x(0, i) -= 0.9375 * kExact;
+    }
+    const std::unique_ptr<StepperOf<Dim>> one = make_stepper(method, scene), other = make_stepper(method, scene);
+    ImpulsesOf<Dim> impulses = make_impulses(scene), others = impulses;
+    const Eigen::VectorXd whole = curl(scene.body, 0.6 + 0.1 * seed);
+    for (int k = 0; k < few_steps(120); ++k) {
+      const Eigen::VectorXd activation = passive(scene.body) + std::min(1.0, k / 40.0) * (whole - passive(scene.body));
+      ASSERT_EQ(one->step(kDt, activation, nullptr, alone, impulses), Termination::kDone) << k;
+      ASSERT_EQ(other->step(kDt, activation, nullptr, beside, others), Termination::kDone) << k;
+      ASSERT_EQ(alone.v, beside.v) << k << " seed " << seed;
+      for (int i = 0; i < scene.body.node_count(); ++i) {
+        ASSERT_TRUE(scene.body.rest(0, i) > (kBar + 1) * kExact || alone.x.col(i) == beside.x.col(i)) << k << " node " << i;
+      }
+      touched += impulses.internal_nodes.norm();
+    }
+  }
+  EXPECT_TRUE(kSanitized || touched > 0);
+}
+
+TEST(SelfContactSets, LookSeldomWhileNothingIsNear) {
+  const auto expect_few = []<int Dim>(const BodyOf<Dim>& body, double speed) {
+    SCOPED_TRACE(speed);
+    SceneOf<Dim> scene = in_the_air(body, false);
+    scene.self_contact.is_on = true;
+    SelfContactSet<Dim> set(scene);
+    std::vector<ContactOf<Dim>> found;
+    const double reach = 0.15 * body.rest_length.minCoeff(), spare = 0.2 * body.rest_length.minCoeff();
+    PointsOf<Dim> gathered_at = body.rest;
+    int of_a_list = 0;  // how often one that is kept until a node has moved by what it spares is made
+    for (int k = 0; k < 960; ++k) {
+      PointsOf<Dim> x = body.rest;
+      const double height = Dim == 3 ? 0.03 : 0.15;  // of a wave along it [-]
+      x.row(1).array() += height * body.rest.row(0).array() * (4 * body.rest.row(0).array() - 6 * k * kDt).sin();
+      x.row(0).array() += speed * k * kDt;
+      found.clear();
+      set.find(x, reach, 0, found);
+      EXPECT_TRUE(k == 0 || found.empty());
+      if (k > 0 && (x - gathered_at).colwise().norm().maxCoeff() <= spare) continue;
+      gathered_at = x;
+      ++of_a_list;
+    }
+    EXPECT_GT(set.searches(), 0);
+    EXPECT_LT(4 * set.searches(), of_a_list);
+  };
+  for (const double speed : {0.5, 5.0}) {
+    expect_few(bar<2>(20, 2, 1, 0.05), speed);
+    expect_few(bar<3>(20, 2, 2, 0.05), speed);
+  }
+}
+
+TEST(SelfContactSets, FindWhatOnesThatNeverLookedFind) {
+  const auto expect_same = []<int Dim>(unsigned seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const SceneOf<Dim> scene = two_blocks<Dim>(false);
+    const double reach = 0.1 * kCell;
+    SelfContactSet<Dim> kept(scene);
+    std::uniform_real_distribution<double> uniform(0.5, 2);
+    const double turn = uniform(random), pace = uniform(random), first = uniform(random);
+    const VectorOf<Dim> travel = random_points<Dim>(random, 1, 3).col(0);
+    const auto near = [&](auto&& set, const PointsOf<Dim>& x) {
+      std::vector<ContactOf<Dim>> found;
+      set.find(x, reach, 0, found);
+      std::erase_if(found, [&](const ContactOf<Dim>& contact) { return !(contact.gap < 2 * reach); });
+      return found;
+    };
+    std::size_t in_reach = 0;
+    for (int k = 0; k < 240; ++k) {
+      const double time = k * kDt, angle = turn * time, away = 0.1 * kCell + 5 * kCell * std::pow(std::sin(first + 4 * pace * time), 2);
+      PointsOf<Dim> x = scene.body.rest;
+      for (int i = 0; i < scene.body.node_count(); ++i) {
+        if (is_second(scene, i)) x(0, i) += away - kCell;
+      }
+      BlockOf<Dim> turned = BlockOf<Dim>::Identity();
+      turned.template topLeftCorner<2, 2>() << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+      x = (turned * x).colwise() + time * travel;
+      const std::vector<ContactOf<Dim>> found = near(kept, x), expected = near(SelfContactSet<Dim>(scene), x);
+      const auto is_same = [](const ContactOf<Dim>& a, const ContactOf<Dim>& b) {
+        return a.slot == b.slot && a.gap == b.gap && a.normal == b.normal;
+      };
+      ASSERT_TRUE(std::equal(found.begin(), found.end(), expected.begin(), expected.end(), is_same)) << k;
+      in_reach += found.size();
+    }
+    EXPECT_GT(in_reach, 0u);
+    EXPECT_LT(kept.searches(), 120);
+  };
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    expect_same.template operator()<2>(seed);
+    if (seed < 2) expect_same.template operator()<3>(seed);
+  }
+}
+
 }  // namespace
 }  // namespace hydrostat::physics::self_contact_test

@@ -172,6 +172,10 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   chosen.setting = choice.setting;
   chosen.report.max_error_length = most_m / length;
   chosen.report.estimated_error_length = choice.estimated_error_m / length;
+  if (choice.row.is_refused) {
+    chosen.report.estimated_error_length = HUGE_VAL;
+    chosen.warnings.push_back(breaks_otherwise(choice.setting, choice.row.pieces, reference.pieces));
+  }
   chosen.curve.subject = "this body";
   chosen.curve.rows = choice.tried;
   chosen.curve.recommended = choice.is_met ? choice.index : -1;
@@ -285,6 +289,14 @@ bool take_coarser(ChosenStep& chosen, const retarget::Performer& solved, const r
   return true;
 }
 
+std::string breaks_otherwise(const retarget::StepSetting& setting, int pieces, int finer_pieces) {
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "accuracy: by '%s' in steps of %.3g s the body ends in %d piece%s, in finer steps in %d: take a smaller dt_s or --max-error",
+                physics::name_of(setting.method).c_str(), setting.dt_s, pieces, pieces == 1 ? "" : "s", finer_pieces);
+  return text;
+}
+
 retarget::AccuracyReport told(const ChosenStep& chosen) {
   retarget::AccuracyReport report = chosen.report;
   report.method = physics::name_of(chosen.setting.method);
@@ -311,6 +323,11 @@ std::string saved_words(const retarget::RunReport& run) {
 
 std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report) {
   char text[240];
+  if (!std::isfinite(report.estimated_error_length)) {
+    std::snprintf(text, sizeof text, "no setting that was tried stays within %.3g %% of L and breaks, or stays up, as in finer steps",
+                  100 * report.max_error_length);
+    return one_line({where, "accuracy", text, "Ask for a larger --max-error or let --method be auto"});
+  }
   std::snprintf(text, sizeof text,
                 "no setting that was tried stays within %.3g %% of L; '%s' with steps of %.3g s, the nearest, has %.3g %%",
                 100 * report.max_error_length, report.method.c_str(), report.dt_s, 100 * report.estimated_error_length);

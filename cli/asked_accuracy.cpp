@@ -158,12 +158,14 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   double floor_m = reference.uncertainty_m();
   double most_m = most_told(asked, command, floor_m, length);
   retarget::StepChoice choice = retarget::choose_setting(reference, most_m, only);
+  int pieces = reference.pieces;
   ChosenStep chosen;
   chosen.report.estimated_span_s = reference.windows.front().duration_s;
   chosen.curve.truth = "Errors are distances to '" + physics::name_of(reference.setting.method) + "' in much shorter steps";
   if (const auto whole = retarget::reference_of_whole(reference, duration_s)) {
     floor_m = whole->uncertainty_m();
     most_m = most_told(asked, command, floor_m, length);
+    pieces = whole->pieces;
     choice = retarget::choose_for_whole(*whole, choice, most_m, only);
     chosen.curve.truth += whole_in_words(*whole, chosen.report.estimated_span_s);
     chosen.report.estimated_span_s = whole->windows.front().duration_s;
@@ -174,7 +176,7 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   chosen.report.estimated_error_length = choice.estimated_error_m / length;
   if (choice.row.is_refused) {
     chosen.report.estimated_error_length = HUGE_VAL;
-    chosen.warnings.push_back(breaks_otherwise(choice.setting, choice.row.pieces, reference.pieces));
+    chosen.warnings.push_back(breaks_otherwise(choice.setting, choice.row.pieces, pieces));
   }
   chosen.curve.subject = "this body";
   chosen.curve.rows = choice.tried;

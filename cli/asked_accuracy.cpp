@@ -158,12 +158,14 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   double floor_m = reference.uncertainty_m();
   double most_m = most_told(asked, command, floor_m, length);
   retarget::StepChoice choice = retarget::choose_setting(reference, most_m, only);
+  int pieces = reference.pieces;
   ChosenStep chosen;
   chosen.report.estimated_span_s = reference.windows.front().duration_s;
   chosen.curve.truth = "Errors are distances to '" + physics::name_of(reference.setting.method) + "' in much shorter steps";
   if (const auto whole = retarget::reference_of_whole(reference, duration_s)) {
     floor_m = whole->uncertainty_m();
     most_m = most_told(asked, command, floor_m, length);
+    pieces = whole->pieces;
     choice = retarget::choose_for_whole(*whole, choice, most_m, only);
     chosen.curve.truth += whole_in_words(*whole, chosen.report.estimated_span_s);
     chosen.report.estimated_span_s = whole->windows.front().duration_s;
@@ -172,6 +174,10 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   chosen.setting = choice.setting;
   chosen.report.max_error_length = most_m / length;
   chosen.report.estimated_error_length = choice.estimated_error_m / length;
+  if (choice.row.is_refused) {
+    chosen.report.estimated_error_length = HUGE_VAL;
+    chosen.warnings.push_back(breaks_otherwise(choice.setting, choice.row.pieces, pieces));
+  }
   chosen.curve.subject = "this body";
   chosen.curve.rows = choice.tried;
   chosen.curve.recommended = choice.is_met ? choice.index : -1;
@@ -285,6 +291,14 @@ bool take_coarser(ChosenStep& chosen, const retarget::Performer& solved, const r
   return true;
 }
 
+std::string breaks_otherwise(const retarget::StepSetting& setting, int pieces, int finer_pieces) {
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "accuracy: by '%s' in steps of %.3g s the body ends in %d piece%s, in finer steps in %d: take a smaller dt_s or --max-error",
+                physics::name_of(setting.method).c_str(), setting.dt_s, pieces, pieces == 1 ? "" : "s", finer_pieces);
+  return text;
+}
+
 retarget::AccuracyReport told(const ChosenStep& chosen) {
   retarget::AccuracyReport report = chosen.report;
   report.method = physics::name_of(chosen.setting.method);
@@ -311,6 +325,11 @@ std::string saved_words(const retarget::RunReport& run) {
 
 std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report) {
   char text[240];
+  if (!std::isfinite(report.estimated_error_length)) {
+    std::snprintf(text, sizeof text, "no setting that was tried stays within %.3g %% of L and breaks, or stays up, as in finer steps",
+                  100 * report.max_error_length);
+    return one_line({where, "accuracy", text, "Ask for a larger --max-error or let --method be auto"});
+  }
   std::snprintf(text, sizeof text,
                 "no setting that was tried stays within %.3g %% of L; '%s' with steps of %.3g s, the nearest, has %.3g %%",
                 100 * report.max_error_length, report.method.c_str(), report.dt_s, 100 * report.estimated_error_length);

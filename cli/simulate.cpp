@@ -191,7 +191,11 @@ int tell(const SimulateCommand& command, const retarget::RunReport& report) {
     std::cerr << too_inaccurate(command.scene, report.accuracy) << std::endl;
     return kShortOfTarget;
   }
-  if (!command.json) std::cout << summary(report, command.out) << "\n" << saved_words(report);
+  if (command.json) return kDone;
+  std::cout << summary(report, command.out) << "\n" << saved_words(report);
+  for (const std::string& warning : report.warnings) {
+    if (warning.starts_with("accuracy: ")) std::cout << warning << ".\n";
+  }
   return kDone;
 }
 
@@ -204,6 +208,7 @@ int simulate(const SimulateCommand& command) {
   if (command.accuracy.is_asked()) {
     chosen = stages.run("accuracy", [&] { return choose(command, scene); });
     report.accuracy = chosen->report;
+    scene.warnings.insert(scene.warnings.end(), chosen->warnings.begin(), chosen->warnings.end());
   }
   const retarget::SimulationOptions options = options_of(command, scene);
   warn_of_steps(scene);
@@ -225,6 +230,9 @@ int simulate(const SimulateCommand& command) {
             const retarget::EstimatedError estimate = error.get();
             report.accuracy.estimated_error_length = estimate.error_length;
             report.accuracy.estimated_span_s = estimate.span_s;
+            if (estimate.pieces != estimate.finer_pieces) {
+              scene.warnings.push_back(breaks_otherwise({options.method, options.dt_s}, estimate.pieces, estimate.finer_pieces));
+            }
           }
           return 0;
         });

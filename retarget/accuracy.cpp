@@ -102,6 +102,14 @@ double distance(const std::vector<PointsOf<Dim>>& a, const std::vector<PointsOf<
   return std::sqrt(sum / count);
 }
 
+/// In how many pieces the body ends; 0: it cannot split.
+template <int Dim>
+int pieces_at_end(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options, const StepSetting& setting) {
+  if (!scenario.fracture) return 0;
+  const WindowOf<Dim> all{0, options.duration_s, scenario.start};
+  return simulate(scenario, options_for(all, setting, options.frame_s)).report.pieces_end;
+}
+
 /// The step of the wished length or less of which whole ones fill a frame.
 double whole_part(double frame_s, double wished_s) { return frame_s / std::ceil(frame_s / wished_s - 1e-9); }
 
@@ -237,7 +245,7 @@ ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyO
 template <int Dim>
 ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options,
                                 std::vector<WindowOf<Dim>> windows, ContactPointsOf<Dim> skin, bool is_checked) {
-  ReferenceOf<Dim> reference{scenario, options, std::move(windows), std::move(skin), {}, {}, 0, {}, 0, 0, 0};
+  ReferenceOf<Dim> reference{scenario, options, std::move(windows), std::move(skin), {}, {}, 0, {}, 0, 0, 0, 0};
   const double own = own_step(scenario.scene, options.frame_s);
   const StepSetting by_explicit{physics::Method::kExplicit, whole_part(options.frame_s, own / options.fineness)};
   const StepSetting by_implicit{physics::Method::kImplicit, whole_part(options.frame_s, kImplicitStep)};
@@ -253,6 +261,8 @@ ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyO
   };
   reference.places = run(reference.setting).places;
   reference.own_error_m = distance<Dim>(reference.places, run(twice(reference.setting)).places);
+  reference.pieces = pieces_at_end(scenario, options, reference.setting);
+  if (pieces_at_end(scenario, options, twice(reference.setting)) != reference.pieces) reference.pieces = 0;
   if (!is_checked) return reference;
   reference.check = is_stiff ? StepSetting{physics::Method::kExplicit, whole_part(options.frame_s, own)} : by_implicit;
   const auto check = run(reference.check).places;
@@ -292,6 +302,8 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   row.momentum_error = repeated.worst.momentum_residual_mg;
   row.angular_error = repeated.worst.angular_residual_mgl;
   row.stable = repeated.is_whole && row.error_rel_length < 1;
+  if (reference.pieces > 0 && row.stable) row.pieces = pieces_at_end(scenario, reference.options, setting);
+  row.is_refused = row.pieces > 0 && row.pieces != reference.pieces;
   if (!repeated.is_whole) row.ms_per_sim_s = row.volume_error = row.momentum_error = row.angular_error = std::nan("");
   return row;
 }
@@ -354,12 +366,11 @@ EstimatedError estimated_error(const ScenarioOf<Dim>& scenario, const Simulation
   }
   Parted found = parted(scenario, accuracy, setting, finer);
   const bool is_free = found.span_s > accuracy.duration_s - accuracy.frame_s;  // neither contact nor a break ended it
-  if (is_free && options.duration_s > accuracy.duration_s) {
-    const double affordable = std::max(kEstimateWork, kEstimateRuns * found.coarse_ms * options.duration_s);
-    accuracy.duration_s = std::min(options.duration_s, affordable / (found.coarse_ms + found.fine_ms));
-    if (accuracy.duration_s > kEstimatedSeconds) found = parted(scenario, accuracy, setting, finer);
-  }
-  return {(finer.method == options.method ? 2 : 1) * found.distance_m / scenario.length, found.span_s};
+  const double affordable = std::max(kEstimateWork, kEstimateRuns * found.coarse_ms * options.duration_s);
+  accuracy.duration_s = std::min(options.duration_s, affordable / (found.coarse_ms + found.fine_ms));
+  if (is_free && accuracy.duration_s > kEstimatedSeconds) found = parted(scenario, accuracy, setting, finer);
+  return {(finer.method == options.method ? 2 : 1) * found.distance_m / scenario.length, found.span_s,
+          pieces_at_end(scenario, accuracy, setting), pieces_at_end(scenario, accuracy, finer)};
 }
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                                          \

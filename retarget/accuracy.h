@@ -44,6 +44,7 @@ struct ReferenceOf {
   double check_distance_m = 0;                 // to the motion by it
   double check_error_m = 0;                    // how far that one moves when its steps are halved
   double work_ms = 0;                          // counted
+  int pieces = 0;  // in which a body that can split ends after options.duration_s; 0: it cannot, or steps twice as long tell another number
 
   /// No error below it can be told [m, RMS]: the reference's own, or, where the second method does not agree within what
   /// both leave open, its distance.
@@ -79,7 +80,8 @@ struct AccuracyRow {
   // Of a creature: of the skin in its closed loop, from that of the finest setting; where it is larger, the error is it. Below 0
   // where that was not tried.
   double loop_error_m = -1;
-  bool is_refused = false;  // for what its closed loop or its whole replay came to
+  int pieces = 0;           // as ReferenceOf::pieces; 0 where the reference has none
+  bool is_refused = false;  // for what its closed loop or its whole replay came to, or for it breaks into other pieces than the reference
 };
 
 /// Repeats the reference's windows. The scenario may hold the same body in another mesh: starts are then carried over.
@@ -99,12 +101,13 @@ std::vector<std::vector<StepSetting>> settings_to_try(const physics::SceneOf<Dim
 struct EstimatedError {
   double error_length = 0;  // per L, RMS over the skin and time
   double span_s = 0;        // of the motion that it is about, from its start: with contact, of every window from its own
+  int pieces = 0, finer_pieces = 0;  // of a body that can split: in which it ends by the setting and by what that was held against
 };
 
 /// The error of a setting where no bound was asked for, from few runs: its distance to the same method in half steps, doubled,
 /// or to an accurate method where its own limit is another body (xpbd, spring), far (euler) or out of reach (explicit on a stiff
 /// body). Where nothing touches it is that of the whole run (until it breaks), or, where that would cost several times what the
-/// run does, of its first part.
+/// run does, of its first part. How it breaks is held against the other method as far into the run as that costs no more.
 template <int Dim>
 EstimatedError estimated_error(const ScenarioOf<Dim>& scenario, const SimulationOptions& options);
 

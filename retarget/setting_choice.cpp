@@ -23,7 +23,7 @@ class Trials {
 
   const std::vector<AccuracyRow>& rows() const { return rows_; }
   const AccuracyRow& row(int k) const { return rows_[static_cast<std::size_t>(k)]; }
-  bool holds(int k) const { return row(k).stable && row(k).error_rms_m <= most_m_; }
+  bool holds(int k) const { return row(k).stable && !row(k).is_refused && row(k).error_rms_m <= most_m_; }
   void put(int k, AccuracyRow row) {
     if (k == static_cast<int>(rows_.size())) {
       rows_.push_back({});
@@ -32,14 +32,20 @@ class Trials {
     rows_[static_cast<std::size_t>(k)] = std::move(row);
     is_whole_[static_cast<std::size_t>(k)] = true;
   }
-  /// -1: none.
-  int best_by(double AccuracyRow::* figure, bool has_to_hold) const {
+  /// Of least work among those that hold; -1: none.
+  int cheapest() const {
     int best = -1;
     for (int k = 0; k < static_cast<int>(rows_.size()); ++k) {
-      if (!is_whole_[static_cast<std::size_t>(k)] || !row(k).stable || (has_to_hold && !holds(k))) continue;
-      if (best < 0 || row(k).*figure < row(best).*figure) best = k;
+      if (!is_whole_[static_cast<std::size_t>(k)] || !holds(k)) continue;
+      if (best < 0 || row(k).work_ms < row(best).work_ms) best = k;
     }
     return best;
+  }
+  /// As most_accurate, of the whole run's.
+  int nearest() const {
+    std::vector<AccuracyRow> whole = rows_;
+    for (std::size_t k = 0; k < whole.size(); ++k) whole[k].stable = whole[k].stable && is_whole_[k];
+    return most_accurate(whole);
   }
 
  private:
@@ -58,7 +64,7 @@ void try_others(const ReferenceOf<Dim>& whole, const std::vector<AccuracyRow>& f
       if (has(first, setting)) continue;
       const int added = static_cast<int>(trials.rows().size());
       trials.put(added, measure_error(whole, whole.scenario, setting));
-      const int best = trials.best_by(&AccuracyRow::work_ms, true);
+      const int best = trials.cheapest();
       if (best >= 0 && trials.row(added).work_ms >= trials.row(best).work_ms) break;
     }
   }
@@ -83,7 +89,7 @@ std::vector<bool> pareto_front(const std::vector<AccuracyRow>& rows, double Accu
 int cheapest_within(const std::vector<AccuracyRow>& rows, double most_m, double AccuracyRow::* time) {
   int best = -1;
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (!rows[k].stable || !(rows[k].error_rms_m <= most_m)) continue;
+    if (!rows[k].stable || rows[k].is_refused || !(rows[k].error_rms_m <= most_m)) continue;
     if (best < 0 || rows[k].*time < rows[static_cast<std::size_t>(best)].*time) best = static_cast<int>(k);
   }
   return best;
@@ -93,7 +99,8 @@ int most_accurate(const std::vector<AccuracyRow>& rows) {
   int best = -1;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (!rows[k].stable) continue;
-    if (best < 0 || rows[k].error_rms_m < rows[static_cast<std::size_t>(best)].error_rms_m) best = static_cast<int>(k);
+    const auto rank = [&](std::size_t row) { return std::pair(rows[row].is_refused, rows[row].error_rms_m); };
+    if (best < 0 || rank(k) < rank(static_cast<std::size_t>(best))) best = static_cast<int>(k);
   }
   return best;
 }
@@ -157,11 +164,11 @@ StepChoice choose_for_whole(const ReferenceOf<Dim>& whole, const StepChoice& fir
   }
   if (chosen < 0) {
     try_others(whole, first.tried, only, trials);
-    chosen = trials.best_by(&AccuracyRow::work_ms, true);
+    chosen = trials.cheapest();
   }
   StepChoice choice;
   choice.is_met = chosen >= 0;
-  if (chosen < 0) chosen = trials.best_by(&AccuracyRow::error_rms_m, false);
+  if (chosen < 0) chosen = trials.nearest();
   if (chosen < 0) {
     chosen = first.index;
     trials.put(chosen, measure(chosen));

@@ -9,9 +9,9 @@ namespace hydrostat::retarget {
 
 /// Which rows no other beats in both error and time; of equal ones the first.
 std::vector<bool> pareto_front(const std::vector<AccuracyRow>& rows, double AccuracyRow::* time = &AccuracyRow::ms_per_sim_s);
-/// The stable row of least `time`, for a choice counted work, whose error is at most `most_m` [m]; none: -1.
+/// The stable row of least `time`, for a choice counted work, that was not refused and whose error is at most `most_m` [m]; none: -1.
 int cheapest_within(const std::vector<AccuracyRow>& rows, double most_m, double AccuracyRow::* time = &AccuracyRow::work_ms);
-/// The stable row of least error; none: -1.
+/// The stable row of least error, one that was refused only where all were; none: -1.
 int most_accurate(const std::vector<AccuracyRow>& rows);
 
 /// The cheapest setting by counted work whose error stays within a bound, measured on this very body.

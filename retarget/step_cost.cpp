@@ -56,7 +56,8 @@ struct Cost {
 constexpr Cost kCosts[2][5] = {
     {
         {{.one = 960, .nodes = 31, .simplices = 16, .boxes = 16, .active_simplices = 210, .active_boxes = 230, .touching = 73, .wet = 73},
-         {.nodes = 9.1, .dashpots = 2.3, .volumes = 10, .simplices = 10, .corotated = 2.3, .boxes = 21, .active_simplices = 14, .active_boxes = 13, .touching = 6.8},
+         {.nodes = 9.1, .dashpots = 2.3, .volumes = 10, .simplices = 10, .corotated = 2.3, .boxes = 21, .active_simplices = 14,
+          .active_boxes = 13, .touching = 6.8},
          {.volumes = 190, .simplices = 610, .boxes = 1100}, 3.2},  // explicit
         {{.one = 750, .active_simplices = 77, .active_boxes = 96, .touching = 200, .wet = 83},
          {.nodes = 19, .dashpots = 3.2, .volumes = 11, .simplices = 5.3, .boxes = 8.5, .active_simplices = 12, .active_boxes = 9.6},
@@ -73,10 +74,12 @@ constexpr Cost kCosts[2][5] = {
     },
     {
         {{.one = 360, .nodes = 92, .simplices = 33, .boxes = 31, .active_simplices = 250, .active_boxes = 560, .touching = 38, .wet = 130},
-         {.nodes = 15, .springs = 2.2, .dashpots = 2.2, .volumes = 12, .simplices = 17, .corotated = 23, .boxes = 120, .active_simplices = 17, .active_boxes = 79, .touching = 16},
+         {.nodes = 15, .springs = 2.2, .dashpots = 2.2, .volumes = 12, .simplices = 17, .corotated = 23, .boxes = 120,
+          .active_simplices = 17, .active_boxes = 79, .touching = 16},
          {.springs = 150, .simplices = 2900, .boxes = 11000}, 10},  // explicit
         {{.one = 3700, .boxes = 650, .touching = 280, .wet = 130},
-         {.nodes = 8.6, .springs = 5.3, .dashpots = 3.2, .volumes = 13, .simplices = 20, .corotated = 14, .boxes = 73, .active_simplices = 21, .active_boxes = 61, .touching = 6.4},
+         {.nodes = 8.6, .springs = 5.3, .dashpots = 3.2, .volumes = 13, .simplices = 20, .corotated = 14, .boxes = 73,
+          .active_simplices = 21, .active_boxes = 61, .touching = 6.4},
          {.nodes = 510, .springs = 100, .simplices = 2000, .boxes = 11000}, 14},  // implicit
         {{.nodes = 210, .boxes = 1200, .active_simplices = 200, .touching = 580},
          {.nodes = 8.6, .springs = 5.3, .dashpots = 3.2, .volumes = 13},

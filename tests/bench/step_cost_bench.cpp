@@ -1,8 +1,8 @@
 // How far counted work (retarget/step_cost.h) is from processor time: bars in the plane and in space, of springs, of triangles or
-// tets and of quads or hexahedra, soft and stiff, held in the air, held in water and lying on the ground, with
-// activations and without, by every method in short and long steps. Usage: step_cost_bench [-o DIR] [-r ROUNDS]. Writes DIR/costs.csv (default DIR: out/costs), a line a run with what was
-// counted and the least time of ROUNDS (4), and prints in markdown for each method and kind of body the median of counted over
-// measured, and within what nine of ten lie.
+// tets and of quads or hexahedra, soft and stiff, held in the air, held in water and lying on the ground, with activations and
+// without, by every method in short and long steps. Usage: step_cost_bench [-o DIR] [-r ROUNDS]. Writes DIR/costs.csv (default DIR:
+// out/costs), a line a run with what was counted and the least time of ROUNDS (4), and prints in markdown for each method and kind of
+// body the median of counted over measured, and within what nine of ten lie.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -118,7 +118,9 @@ void write_csv(const std::vector<Run>& runs, const fs::path& file) {
       const auto& body = scenario.scene.body;
       long elements = 0;
       for (const auto& block : body.elements) elements += block.block.element_count();
-      csv << '"' << run.kind << "\"," << run.surroundings.name << ',' << run.surroundings.is_active << ',' << run.youngs_modulus << ',' << run.damping_time << ',' << physics::name_of(run.method) << ','
+      csv << '"' << run.kind << "\",";
+      csv << run.surroundings.name << ',' << run.surroundings.is_active << ',' << run.youngs_modulus << ',' << run.damping_time << ','
+          << physics::name_of(run.method) << ','
           << run.dt_s << ',' << body.node_count() << ',' << body.edge_count() << ',' << (body.edge_stiffness.array() > 0).count() << ','
           << (body.edge_damping.array() > 0).count() << ',' << body.volume_stiffness.size() << ',' << elements << ','
           << scenario.scene.contact_points.count() << ',' << run.steps << ',' << run.work.passes << ',' << run.work.sweeps << ',' << run.work.assemblies << ','

@@ -9,9 +9,11 @@
 #include <regex>
 #include <sstream>
 
+#include "cli/asked_accuracy.h"
 #include "io/accuracy_page.h"
 #include "io/label_places.h"
 #include "tests/cli/run_program.h"
+#include "tests/retarget/box_performer.h"
 #include "tests/sanitizers.h"
 
 namespace hydrostat::cli::accuracy_test {
@@ -104,6 +106,60 @@ TEST_F(AccuracyCommands, TellOfHowMuchOfTheRunTheErrorIs) {
   EXPECT_NEAR(report("given")["accuracy"]["estimated_span_s"], 3, 1e-9);
   ASSERT_EQ(run("simulate scene.toml -o touching --quiet").exit_code, 0);
   EXPECT_NEAR(report("touching")["accuracy"]["estimated_span_s"], 0.1, 1e-9);  // of every window
+}
+
+/// A bar that is pulled down: the jerk breaks its seam, but long steps of euler damp it.
+std::string jerked_bar(double strength, const std::string& steps) {
+  return "dimension = 2\nduration_s = 1.0\n" + steps +
+         "[body]\nshape = \"bar\"\nsize_m = [0.2, 0.6]\nnodes = 24\nposition_m = [0.0, 1.0]\n"
+         "[material]\nyoungs_modulus_pa = 2e5\ndamping_time_s = 0.005\n[[clamp]]\nnormal = [0.0, 1.0]\noffset_m = 0.29\n"
+         "[[push]]\ntime_s = 0.1\nduration_s = 0.03\ndelta_v_m_s = [0.0, -1.0]\n[[seam]]\nnormal = [0.0, 1.0]\nstrength_pa = " +
+         std::to_string(strength) + "\n";
+}
+
+TEST_F(AccuracyCommands, TakeNoStepByWhichABodyBreaksOtherwiseAndWarnOfOneThatIsGiven) {
+  const std::string warning = "by 'euler' in steps of 0.0333 s the body ends in 1 piece, in finer steps in 2";
+  for (int seed = 0; seed < 3; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const double strength = 1.1e4 + 1.2e3 * seed;
+    io::write_file(directory.path / "plain.toml", jerked_bar(strength, ""));
+    io::write_file(directory.path / "rough.toml", jerked_bar(strength, "method = \"euler\"\ndt_s = 0.0333333333\n"));
+    ASSERT_EQ(run("simulate plain.toml -o plain --quiet").exit_code, 0);
+    ASSERT_EQ(report("plain")["simulation"]["pieces_end"], 2);
+    EXPECT_EQ(report("plain")["warnings"].dump().find("the body ends in"), std::string::npos);
+    const Outcome rough = run("simulate rough.toml -o rough --quiet");
+    ASSERT_EQ(report("rough")["simulation"]["pieces_end"], 1);
+    EXPECT_NE(rough.out.find(warning), std::string::npos) << rough.out;
+    EXPECT_NE(report("rough")["warnings"].dump().find(warning), std::string::npos);
+    for (const char* scene : {"plain.toml", "rough.toml"}) {  // of all methods, and of euler alone
+      const Outcome draft = run(std::string("simulate ") + scene + " -o draft --accuracy draft --quiet");
+      EXPECT_EQ(draft.exit_code, 0) << draft.err;
+      EXPECT_EQ(report("draft")["simulation"]["pieces_end"], 2) << scene;
+    }
+  }
+  io::write_file(directory.path / "strong.toml", jerked_bar(1.4e4, "method = \"euler\"\n"));  // no step of euler breaks it
+  const Outcome none = run("simulate strong.toml -o none --accuracy draft --quiet");
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_NE(none.err.find("and breaks, or stays up, as in finer steps"), std::string::npos) << none.err;
+  EXPECT_NE(report("none")["warnings"].dump().find("the body ends in 1 piece"), std::string::npos);
+}
+
+/// All told in counted work: the clock has no say.
+TEST(ChosenStep, OfADraftCostsLessThanOfAFinalAndBothKeepTheirError) {
+  const retarget::Performer performer = retarget::make_box_performer();
+  const retarget::SignalSet signals = retarget::signals_of(performer);
+  const auto choose = [&](const std::string& grade) {
+    ChosenStep chosen = choose_step({"", grade}, "hydrostat convert", performer, signals, std::nullopt);
+    EXPECT_TRUE(chosen.report.is_met()) << grade;
+    EXPECT_LE(chosen.report.estimated_error_length, chosen.report.max_error_length) << grade;
+    return chosen;
+  };
+  const auto work_ms = [](const ChosenStep& chosen) { return chosen.curve.rows.at(static_cast<std::size_t>(chosen.curve.recommended)).work_ms; };
+  const ChosenStep draft = choose("draft"), finest = choose("final");
+  EXPECT_GT(draft.report.max_error_length, 10 * finest.report.max_error_length);
+  EXPECT_LT(work_ms(draft), work_ms(finest));                          // the motion
+  EXPECT_LT(draft.reference->work_ms, finest.reference->work_ms);      // what it is held against
+  EXPECT_LE(draft.curve.rows.size(), finest.curve.rows.size());        // and how much is tried
 }
 
 TEST_F(AccuracyCommands, RefuseAnEmptyError) {

@@ -28,6 +28,30 @@ TEST(CommandLine, IsTheReadmesSubject) {
   }
 }
 
+/// Choices are those of a type name such as TEXT:{tet,hex}.
+TEST(CommandLine, HelpThatNamesTwoChoicesNamesAll) {
+  int exit_code = 0, seen = 0;
+  const std::shared_ptr<CLI::App> app = command_line(exit_code);
+  for (const CLI::App* subcommand : app->get_subcommands([](const CLI::App*) { return true; })) {
+    for (const CLI::Option* option : subcommand->get_options()) {
+      const std::string type = option->get_type_name(), text = " " + option->get_description() + " ";
+      const std::size_t begin = type.find('{'), end = type.find('}');
+      if (begin == std::string::npos || end == std::string::npos) continue;
+      std::vector<std::string> named, left_out;
+      std::istringstream choices(type.substr(begin + 1, end - begin - 1));
+      for (std::string choice; std::getline(choices, choice, ',');) {
+        const std::size_t at = text.find(" " + choice);
+        const bool is_named = at != std::string::npos && std::isalnum(static_cast<unsigned char>(text[at + 1 + choice.size()])) == 0;
+        (is_named ? named : left_out).push_back(choice);
+      }
+      if (named.size() < 2) continue;
+      ++seen;
+      EXPECT_TRUE(left_out.empty()) << "--help of " << subcommand->get_name() << " leaves out '" << left_out.front() << "' of " << option->get_name();
+    }
+  }
+  EXPECT_GE(seen, 4);
+}
+
 TEST(CommandLine, TellsUsageErrorsOnOneLineWithExitCode2) {
   const TemporaryDirectory directory;
   const auto expect = [&](const std::string& arguments, const std::string& message) {

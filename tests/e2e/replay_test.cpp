@@ -251,6 +251,21 @@ TEST_F(Replay, TracesTheMeansOverLongerRows) {
   EXPECT_LT(fine.path_miss, 0.7 * coarse.path_miss);  // positions follow velocities the better the shorter the rows
 }
 
+TEST_F(Replay, TakesTheCheapestStepWithinAnErrorAndSaysWhatCanBeTold) {
+  const Outcome asked = replay("--duration 1 --max-error 2%");
+  ASSERT_EQ(asked.exit_code, 0) << asked.err;
+  const nlohmann::json accuracy = report_of(creature_)["accuracy"];
+  EXPECT_EQ(accuracy["max_error_length"], 0.02);
+  EXPECT_LE(accuracy["estimated_error_length"], 0.02);
+  EXPECT_GT(accuracy["work_saved"], 0);
+  EXPECT_NE(asked.out.find("by '" + accuracy["method"].get<std::string>() + "'"), std::string::npos) << asked.out;
+  const std::string motion = motion_bytes(creature_);
+  const Outcome too_small = replay("--max-error 0.00001%");
+  EXPECT_EQ(too_small.exit_code, 2);
+  EXPECT_NE(too_small.err.find("is only known within"), std::string::npos) << too_small.err;
+  EXPECT_EQ(motion_bytes(creature_), motion);
+}
+
 TEST_F(Replay, RefusesWhatItCannotDoAndABodyThatIsNotItsOwn) {
   const auto expect = [&](const std::string& options, int exit_code, const std::string& told) {
     SCOPED_TRACE(options);

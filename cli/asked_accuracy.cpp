@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <numeric>
+#include <optional>
 
 #include "cli/command_line.h"
 #include "cli/number_option.h"
@@ -145,6 +147,36 @@ std::string whole_in_words(const retarget::ReferenceOf<Dim>& whole, double first
   return text;
 }
 
+std::string in_words(const retarget::StepSetting& setting) {
+  char text[80];
+  std::snprintf(text, sizeof text, "'%s' in steps of %.3g s", physics::name_of(setting.method).c_str(), setting.dt_s);
+  return text;
+}
+
+std::string in_words(const retarget::Breaking& breaking) {
+  if (!breaking.is_broken()) return "does not break";
+  char text[120];
+  const int faces = std::accumulate(breaking.faces.begin(), breaking.faces.end(), 0);
+  std::snprintf(text, sizeof text, "breaks from %.3g to %.3g s, at %d face%s, into %d piece%s", breaking.first_s, breaking.last_s, faces,
+                faces == 1 ? "" : "s", breaking.pieces, breaking.pieces == 1 ? "" : "s");
+  return text;
+}
+
+/// What is known of a motion after its body has broken; empty where it does not.
+template <int Dim>
+std::string told_after_break(const retarget::ReferenceOf<Dim>& reference) {
+  if (!reference.breaking.is_broken()) return "";
+  char text[240];
+  std::snprintf(text, sizeof text,
+                reference.is_breaking_settled
+                    ? "accuracy: the body breaks at %.3g s; the error is that of the motion before, after it only that the same breaks at the same "
+                      "time, within %.2g s, is held"
+                    : "accuracy: the body breaks at %.3g s, and in what way hangs on the step in the shortest ones, too; nothing is told of the "
+                      "motion after it",
+                reference.breaking.first_s, reference.options.frame_s);
+  return text;
+}
+
 }  // namespace
 
 double AskedAccuracy::most(const std::string& command) const {
@@ -158,14 +190,15 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   double floor_m = reference.uncertainty_m();
   double most_m = most_told(asked, command, floor_m, length);
   retarget::StepChoice choice = retarget::choose_setting(reference, most_m, only);
-  int pieces = reference.pieces;
+  const retarget::ReferenceOf<Dim>* truth = &reference;
   ChosenStep chosen;
   chosen.report.estimated_span_s = reference.windows.front().duration_s;
   chosen.curve.truth = "Errors are distances to '" + physics::name_of(reference.setting.method) + "' in much shorter steps";
-  if (const auto whole = retarget::reference_of_whole(reference, duration_s)) {
+  const std::optional<retarget::ReferenceOf<Dim>> whole = retarget::reference_of_whole(reference, duration_s);
+  if (whole) {
+    truth = &*whole;
     floor_m = whole->uncertainty_m();
     most_m = most_told(asked, command, floor_m, length);
-    pieces = whole->pieces;
     choice = retarget::choose_for_whole(*whole, choice, most_m, only);
     chosen.curve.truth += whole_in_words(*whole, chosen.report.estimated_span_s);
     chosen.report.estimated_span_s = whole->windows.front().duration_s;
@@ -176,7 +209,9 @@ ChosenStep choose_step(const AskedAccuracy& asked, const std::string& command, c
   chosen.report.estimated_error_length = choice.estimated_error_m / length;
   if (choice.row.is_refused) {
     chosen.report.estimated_error_length = HUGE_VAL;
-    chosen.warnings.push_back(breaks_otherwise(choice.setting, choice.row.pieces, pieces));
+    chosen.warnings.push_back(breaks_otherwise(choice.setting, choice.row.breaking, truth->setting, truth->breaking));
+  } else if (const std::string after = told_after_break(*truth); !after.empty()) {
+    chosen.warnings.push_back(after);
   }
   chosen.curve.subject = "this body";
   chosen.curve.rows = choice.tried;
@@ -291,12 +326,12 @@ bool take_coarser(ChosenStep& chosen, const retarget::Performer& solved, const r
   return true;
 }
 
-std::string breaks_otherwise(const retarget::StepSetting& setting, int pieces, int finer_pieces) {
-  char text[240];
-  std::snprintf(text, sizeof text,
-                "accuracy: by '%s' in steps of %.3g s the body ends in %d piece%s, in finer steps in %d: take a smaller dt_s or --max-error",
-                physics::name_of(setting.method).c_str(), setting.dt_s, pieces, pieces == 1 ? "" : "s", finer_pieces);
-  return text;
+std::string breaks_otherwise(const retarget::StepSetting& setting, const retarget::Breaking& breaking, const retarget::StepSetting& finer,
+                             const retarget::Breaking& finer_breaking) {
+  const std::string advice = finer.method == setting.method ? "take a smaller dt_s or --max-error"
+                                                            : "take a smaller --max-error or --method " + physics::name_of(finer.method);
+  return "accuracy: by " + in_words(setting) + " the body " + in_words(breaking) + ", by " + in_words(finer) + " it " +
+         in_words(finer_breaking) + ": " + advice;
 }
 
 retarget::AccuracyReport told(const ChosenStep& chosen) {

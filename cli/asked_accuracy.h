@@ -74,8 +74,9 @@ bool take_coarser(ChosenStep& chosen, const retarget::Performer& solved, const r
 /// The line that tells what a choice costs and saves; empty where nothing was chosen.
 std::string saved_words(const retarget::RunReport& run);
 
-/// The warning of a setting by which a body ends in other pieces than in finer steps.
-std::string breaks_otherwise(const retarget::StepSetting& setting, int pieces, int finer_pieces);
+/// The warning of a setting by which a body breaks otherwise than by `finer`.
+std::string breaks_otherwise(const retarget::StepSetting& setting, const retarget::Breaking& breaking, const retarget::StepSetting& finer,
+                             const retarget::Breaking& finer_breaking);
 
 /// The line that tells of an error above what was asked for.
 std::string too_inaccurate(const std::string& where, const retarget::AccuracyReport& report);

@@ -230,8 +230,9 @@ int simulate(const SimulateCommand& command) {
             const retarget::EstimatedError estimate = error.get();
             report.accuracy.estimated_error_length = estimate.error_length;
             report.accuracy.estimated_span_s = estimate.span_s;
-            if (estimate.pieces != estimate.finer_pieces) {
-              scene.warnings.push_back(breaks_otherwise({options.method, options.dt_s}, estimate.pieces, estimate.finer_pieces));
+            const retarget::StepSetting setting{options.method, options.dt_s};
+            if (!retarget::break_alike(estimate.breaking, estimate.finer_breaking, retarget::AccuracyOptions().frame_s)) {
+              scene.warnings.push_back(breaks_otherwise(setting, estimate.breaking, estimate.finer, estimate.finer_breaking));
             }
           }
           return 0;

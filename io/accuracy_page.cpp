@@ -244,7 +244,7 @@ std::string diagram(const AccuracyCurve& curve, bool has_links) {
         "cx=\"" + short_number(x.at(row.*time), 5) + "\" cy=\"" + short_number(y.at(row.error_rel_length), 5) + "\"";
     svg += (has_links ? "<a href=\"#row" + std::to_string(k) + "\">" : std::string("<g>")) + "<title>" +
            escaped(name_of(row)) + ": " + percent(row.error_rel_length) + " of L, " + short_number(row.*time) +
-           " ms a second" + (row.is_refused ? row.pieces > 0 ? ", refused for breaking otherwise" : ", refused by its closed loop" : "") + "</title>";
+           " ms a second" + (row.is_refused ? row.breaking.pieces > 0 ? ", refused for breaking otherwise" : ", refused by its closed loop" : "") + "</title>";
     if (static_cast<int>(k) == curve.recommended)
       svg += "<circle " + at + " r=\"10\" fill=\"none\" stroke=\"#000\" stroke-width=\"2\"/>";
     const bool is_box = row.element == "hex" || row.element == "quad";

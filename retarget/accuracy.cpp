@@ -84,11 +84,15 @@ Repeated<Dim> repeat(const ScenarioOf<Dim>& scenario, const std::vector<WindowOf
   return repeated;
 }
 
+template <int Dim>
+bool is_active(const ScenarioOf<Dim>& scenario) {
+  return scenario.drive || !scenario.waves.empty();
+}
+
 /// Counted.
 template <int Dim>
 double work_ms(const ScenarioOf<Dim>& scenario, const StepSetting& setting, const Repeated<Dim>& repeated) {
-  const bool is_active = scenario.drive || !scenario.waves.empty();
-  return counted_ms(scenario.scene, setting.method, is_active, repeated.steps, repeated.work);
+  return counted_ms(scenario.scene, setting.method, is_active(scenario), repeated.steps, repeated.work);
 }
 
 /// [m] RMS over points and frames.
@@ -102,12 +106,29 @@ double distance(const std::vector<PointsOf<Dim>>& a, const std::vector<PointsOf<
   return std::sqrt(sum / count);
 }
 
-/// In how many pieces the body ends; 0: it cannot split.
+/// A body that can split over the whole span, which it may spend in parts.
+struct Whole {
+  Breaking breaking;
+  double work_ms = 0, ms_per_sim_s = 0;  // as AccuracyRow's
+};
+
 template <int Dim>
-int pieces_at_end(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options, const StepSetting& setting) {
-  if (!scenario.fracture) return 0;
+Whole whole_run(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options, const StepSetting& setting) {
   const WindowOf<Dim> all{0, options.duration_s, scenario.start};
-  return simulate(scenario, options_for(all, setting, options.frame_s)).report.pieces_end;
+  const Simulation run = simulate(scenario, options_for(all, setting, options.frame_s));
+  Whole whole;
+  whole.breaking.pieces = run.report.pieces_end;
+  for (const BreakReport& one : run.report.fractures) {
+    std::vector<int>& faces = whole.breaking.faces;
+    faces.resize(std::max(faces.size(), static_cast<std::size_t>(one.seam) + 1), 0);
+    faces[static_cast<std::size_t>(one.seam)] += one.faces;
+    whole.breaking.last_s = one.time_s;
+  }
+  if (whole.breaking.is_broken()) whole.breaking.first_s = run.report.fractures.front().time_s;
+  const double seconds = std::max(setting.dt_s, run.report.duration_s);
+  whole.work_ms = counted_ms(scenario.scene, setting.method, is_active(scenario), std::round(seconds / setting.dt_s), run.work) / seconds;
+  whole.ms_per_sim_s = run.report.ms_per_sim_s;
+  return whole;
 }
 
 /// The step of the wished length or less of which whole ones fill a frame.
@@ -227,6 +248,11 @@ std::string element_of(const physics::BodyOf<Dim>& body) {
 
 }  // namespace
 
+bool break_alike(const Breaking& a, const Breaking& b, double within_s) {
+  return a.pieces == b.pieces && a.faces == b.faces && std::abs(a.first_s - b.first_s) <= within_s &&
+         std::abs(a.last_s - b.last_s) <= within_s;
+}
+
 template <int Dim>
 double ReferenceOf<Dim>::uncertainty_m() const {
   return check_distance_m <= kAgreement * (own_error_m + check_error_m) ? own_error_m : check_distance_m;
@@ -245,7 +271,7 @@ ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyO
 template <int Dim>
 ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyOptions& options,
                                 std::vector<WindowOf<Dim>> windows, ContactPointsOf<Dim> skin, bool is_checked) {
-  ReferenceOf<Dim> reference{scenario, options, std::move(windows), std::move(skin), {}, {}, 0, {}, 0, 0, 0, 0};
+  ReferenceOf<Dim> reference{scenario, options, std::move(windows), std::move(skin), {}, {}, 0, {}, 0, 0, 0, {}, false};
   const double own = own_step(scenario.scene, options.frame_s);
   const StepSetting by_explicit{physics::Method::kExplicit, whole_part(options.frame_s, own / options.fineness)};
   const StepSetting by_implicit{physics::Method::kImplicit, whole_part(options.frame_s, kImplicitStep)};
@@ -261,8 +287,11 @@ ReferenceOf<Dim> make_reference(const ScenarioOf<Dim>& scenario, const AccuracyO
   };
   reference.places = run(reference.setting).places;
   reference.own_error_m = distance<Dim>(reference.places, run(twice(reference.setting)).places);
-  reference.pieces = pieces_at_end(scenario, options, reference.setting);
-  if (pieces_at_end(scenario, options, twice(reference.setting)) != reference.pieces) reference.pieces = 0;
+  if (scenario.fracture) {
+    reference.breaking = whole_run(scenario, options, reference.setting).breaking;
+    const Breaking rougher = whole_run(scenario, options, twice(reference.setting)).breaking;
+    reference.is_breaking_settled = break_alike(reference.breaking, rougher, options.frame_s);
+  }
   if (!is_checked) return reference;
   reference.check = is_stiff ? StepSetting{physics::Method::kExplicit, whole_part(options.frame_s, own)} : by_implicit;
   const auto check = run(reference.check).places;
@@ -302,8 +331,13 @@ AccuracyRow measure_error(const ReferenceOf<Dim>& reference, const ScenarioOf<Di
   row.momentum_error = repeated.worst.momentum_residual_mg;
   row.angular_error = repeated.worst.angular_residual_mgl;
   row.stable = repeated.is_whole && row.error_rel_length < 1;
-  if (reference.pieces > 0 && row.stable) row.pieces = pieces_at_end(scenario, reference.options, setting);
-  row.is_refused = row.pieces > 0 && row.pieces != reference.pieces;
+  if (scenario.fracture && row.stable) {
+    const Whole whole = whole_run(scenario, reference.options, setting);
+    row.breaking = whole.breaking;
+    row.work_ms = whole.work_ms;
+    row.ms_per_sim_s = whole.ms_per_sim_s;
+    row.is_refused = reference.is_breaking_settled && !break_alike(row.breaking, reference.breaking, reference.options.frame_s);
+  }
   if (!repeated.is_whole) row.ms_per_sim_s = row.volume_error = row.momentum_error = row.angular_error = std::nan("");
   return row;
 }
@@ -369,8 +403,11 @@ EstimatedError estimated_error(const ScenarioOf<Dim>& scenario, const Simulation
   const double affordable = std::max(kEstimateWork, kEstimateRuns * found.coarse_ms * options.duration_s);
   accuracy.duration_s = std::min(options.duration_s, affordable / (found.coarse_ms + found.fine_ms));
   if (is_free && accuracy.duration_s > kEstimatedSeconds) found = parted(scenario, accuracy, setting, finer);
-  return {(finer.method == options.method ? 2 : 1) * found.distance_m / scenario.length, found.span_s,
-          pieces_at_end(scenario, accuracy, setting), pieces_at_end(scenario, accuracy, finer)};
+  EstimatedError estimate{(finer.method == options.method ? 2 : 1) * found.distance_m / scenario.length, found.span_s, finer, {}, {}};
+  if (!scenario.fracture) return estimate;
+  estimate.breaking = whole_run(scenario, accuracy, setting).breaking;
+  estimate.finer_breaking = whole_run(scenario, accuracy, finer).breaking;
+  return estimate;
 }
 
 #define HYDROSTAT_INSTANTIATE(Dim)                                                                                          \

@@ -30,6 +30,18 @@ struct AccuracyOptions {
   int fineness = 4;                // the reference's substeps in one of explicit's own
 };
 
+/// How a body that can split does so over a span.
+struct Breaking {
+  int pieces = 0;                  // in which it ends; 0: it cannot split
+  double first_s = 0, last_s = 0;  // when the first and the last of what broke did; 0 where nothing has
+  std::vector<int> faces;          // of each seam up to the last that broke, how many broke
+
+  bool is_broken() const { return !faces.empty(); }
+};
+/// Whether two bodies end in as many pieces, with as many faces of each seam broken, the first and the last of them `within_s` of each
+/// other.
+bool break_alike(const Breaking& a, const Breaking& b, double within_s);
+
 /// What is to be repeated, as it truly goes: by an accurate method in short steps.
 template <int Dim>
 struct ReferenceOf {
@@ -44,7 +56,8 @@ struct ReferenceOf {
   double check_distance_m = 0;                 // to the motion by it
   double check_error_m = 0;                    // how far that one moves when its steps are halved
   double work_ms = 0;                          // counted
-  int pieces = 0;  // in which a body that can split ends after options.duration_s; 0: it cannot, or steps twice as long tell another number
+  Breaking breaking;                           // within options.duration_s
+  bool is_breaking_settled = false;            // steps twice as long break the body alike
 
   /// No error below it can be told [m, RMS]: the reference's own, or, where the second method does not agree within what
   /// both leave open, its distance.
@@ -72,6 +85,7 @@ struct AccuracyRow {
   double error_rms_m = 0, error_rel_length = 0;
   double ms_per_sim_s = 0;                       // as the clock of this thread has it
   double work_ms = 0;                            // counted, a simulated second: what choices go by
+  // Both of what breaks are of all of options.duration_s: its parts touch each other.
   // Of what ran away these are not told (NaN), nor is its time.
   double volume_error = 0;                       // the whole body's, at most
   double momentum_error = 0, angular_error = 0;  // what booked impulses do not explain: m g, m g L
@@ -80,8 +94,8 @@ struct AccuracyRow {
   // Of a creature: of the skin in its closed loop, from that of the finest setting; where it is larger, the error is it. Below 0
   // where that was not tried.
   double loop_error_m = -1;
-  int pieces = 0;           // as ReferenceOf::pieces; 0 where the reference has none
-  bool is_refused = false;  // for what its closed loop or its whole replay came to, or for it breaks into other pieces than the reference
+  Breaking breaking;         // within the reference's options.duration_s
+  bool is_refused = false;  // for what its closed loop or its whole replay came to, or for it breaks otherwise than the reference
 };
 
 /// Repeats the reference's windows. The scenario may hold the same body in another mesh: starts are then carried over.
@@ -101,7 +115,8 @@ std::vector<std::vector<StepSetting>> settings_to_try(const physics::SceneOf<Dim
 struct EstimatedError {
   double error_length = 0;  // per L, RMS over the skin and time
   double span_s = 0;        // of the motion that it is about, from its start: with contact, of every window from its own
-  int pieces = 0, finer_pieces = 0;  // of a body that can split: in which it ends by the setting and by what that was held against
+  StepSetting finer;         // what it was held against
+  Breaking breaking, finer_breaking;  // of a body that can split: by the setting and by that
 };
 
 /// The error of a setting where no bound was asked for, from few runs: its distance to the same method in half steps, doubled,

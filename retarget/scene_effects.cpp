@@ -52,6 +52,12 @@ double self_contact_seconds(const ScenarioOf<Dim>& scenario, const SimulationOpt
   return seconds_between(scenario.scene, without, scenario, options);
 }
 
+/// The same of the parts of a body that can split, all of them apart and as they lie at the start.
+template <int Dim>
+double parts_contact_seconds(const ScenarioOf<Dim>& scenario, const SimulationOptions& options) {
+  return self_contact_seconds(written_scenario(scenario), options);
+}
+
 /// The elastic forces' cost with and without volumes.
 template <int Dim, typename Timing>
 double ms_of_volume(const physics::BodyOf<Dim>& body, const physics::StateOf<Dim>& state, const Eigen::VectorXd& activation,
@@ -118,9 +124,11 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
   tell("friction", has_friction, "nothing rubs", "solved with the contact and counted there", 0);
   tell("obstacles", !scene.obstacles.empty(), "the scene has none",
        scene.has_ground ? "counted with the ground's contact" : "the cost is that of all contact", scene.has_ground ? 0 : contact);
-  effects.push_back({"self_contact", touches_itself ? "on" : "off",
-                     scenario.self_contact_reason + (touches_itself ? "; timed from the start" : ""),
-                     touches_itself ? 1000 * self_contact_seconds(scenario, options) : 0});
+  const bool parts_touch = !touches_itself && scenario.fracture && scenario.fracture->self_contact.is_on;
+  const double itself = touches_itself ? self_contact_seconds(scenario, options) : parts_touch ? parts_contact_seconds(scenario, options) : 0;
+  effects.push_back({"self_contact", touches_itself || parts_touch ? "on" : "off",
+                     scenario.self_contact_reason + (touches_itself ? "; timed from the start" : parts_touch ? ", timed with all of them apart" : ""),
+                     1000 * itself});
   tell("volume", has_volume_springs || !body.elements.empty(), "nothing keeps volume", "",
        has_volume_springs ? ms_of_volume(body, state, passive, ms_of) : 0);
   tell("damping", has_damping, "damping_time_s is 0", "timed as a pass over the constraints of its own",

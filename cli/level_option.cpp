@@ -17,8 +17,14 @@ constexpr double kLeastBudget = 1e-3, kMostBudget = 1e5;  // [ms]
 
 double budget_ms(const AskedLevel& asked, const std::string& command) {
   if (asked.budget.empty()) return 0;
-  const std::string number = asked.budget.ends_with("ms") ? asked.budget.substr(0, asked.budget.size() - 2) : asked.budget;
-  return parse_number(number, kLeastBudget, kMostBudget, command, "--budget");
+  return parse_milliseconds(asked.budget, kLeastBudget, kMostBudget, command, "--budget");
+}
+
+std::string far_from_wish(int wished, int nodes) {
+  if (nodes <= kFarOff * wished && wished <= kFarOff * nodes) return "";
+  char text[160];
+  std::snprintf(text, sizeof text, "level: the control mesh has %d nodes where --lod asks for %d, for its lattice goes by whole cells", nodes, wished);
+  return text;
 }
 
 void add_level_options(CLI::App& app, AskedLevel& asked) {

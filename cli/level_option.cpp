@@ -1,6 +1,7 @@
 #include "cli/level_option.h"
 
 #include <cmath>
+#include <cstdio>
 
 #include "cli/asked_accuracy.h"
 #include "cli/number_option.h"
@@ -12,6 +13,7 @@ namespace {
 constexpr const char* kAuto = "auto";
 constexpr double kFewest = 20, kMost = 5000;              // nodes
 constexpr double kLeastBudget = 1e-3, kMostBudget = 1e5;  // [ms]
+constexpr double kFarOff = 1.5;                           // of a wish, or the wish of it [-]
 
 }  // namespace
 
@@ -91,6 +93,10 @@ io::LoadedCreature at_level(const io::LoadedCreature& creature, const retarget::
   report.pieces = performer.mesh.pieces;
   report.bridged_cells = performer.mesh.bridged_cells;
   report.copied_cells = performer.mesh.copied_cells;
+  if (asked.lod != kAuto && cost.wished > 0) {
+    const std::string warning = far_from_wish(cost.wished, report.nodes);
+    if (!warning.empty()) level.target.report.warnings.push_back(warning);
+  }
   level.target.report.level = retarget::LevelReport{report.nodes, solved_nodes, cost.work_ms, budget_ms(asked, command)};
   return level;
 }

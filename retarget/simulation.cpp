@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "physics/effect.h"
 #include "physics/internal_forces.h"

@@ -14,6 +14,7 @@
 #include "cli/subject.h"
 #include "io/accuracy_page.h"
 #include "io/scene_file.h"
+#include "io/writable.h"
 #include "io/write_file.h"
 #include "retarget/error.h"
 #include "retarget/performed_scenario.h"
@@ -93,6 +94,7 @@ class Bench {
 
   io::AccuracyCurve run() {
     const Subject subject = read_subject(command_.subject);
+    io::refuse_unwritable(command_.out);
     if (subject.creature) {
       of_creature(*subject.creature);
     } else {

@@ -11,6 +11,7 @@
 #include "cli/subject.h"
 #include "io/creature_scene.h"
 #include "io/effects_page.h"
+#include "io/writable.h"
 #include "io/write_file.h"
 #include "retarget/effect_bench.h"
 #include "retarget/effect_plan.h"
@@ -50,6 +51,7 @@ std::vector<retarget::EffectRow> of_creature(const EffectsCommand& command, io::
 
 int effects(const EffectsCommand& command) {
   Subject subject = read_subject(command.subject);
+  io::refuse_unwritable(command.out);
   const std::vector<retarget::EffectRow> rows =
       subject.scene ? of_scene(command, *subject.scene) : of_creature(command, *subject.creature);
   const fs::path out = command.out;

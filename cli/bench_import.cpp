@@ -12,6 +12,7 @@
 #include "cli/command_line.h"
 #include "cli/import_options.h"
 #include "io/import_worker.h"
+#include "io/writable.h"
 #include "io/write_file.h"
 
 namespace hydrostat::cli {
@@ -63,6 +64,7 @@ std::string row(const std::string& clip, const io::ImportOptions& options) {
 }
 
 int bench_import(const ImportBench& command) {
+  io::refuse_unwritable(command.out);
   std::string table = "file,bytes,read_wall_s,read_cpu_s,read_peak_mib,import_s,own_peak_mib,vertices,frames\n";
   std::cout << table;
   std::vector<std::string> clips;

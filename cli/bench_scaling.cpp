@@ -12,6 +12,7 @@
 #include "cli/progress.h"
 #include "io/scaling_page.h"
 #include "io/scene_file.h"
+#include "io/writable.h"
 #include "io/write_file.h"
 
 namespace hydrostat::cli {
@@ -92,6 +93,7 @@ std::string summary(const io::ScalingReport& report) {
 
 int scaling(const ScalingCommand& command) {
   const fs::path out = command.out;
+  io::refuse_unwritable(out);
   fs::path file = command.scene;
   if (command.scene == "-") {
     file = out / "scene.toml";

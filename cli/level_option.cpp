@@ -1,6 +1,7 @@
 #include "cli/level_option.h"
 
 #include <cmath>
+#include <cstdio>
 
 #include "cli/asked_accuracy.h"
 #include "cli/number_option.h"
@@ -12,13 +13,20 @@ namespace {
 constexpr const char* kAuto = "auto";
 constexpr double kFewest = 20, kMost = 5000;              // nodes
 constexpr double kLeastBudget = 1e-3, kMostBudget = 1e5;  // [ms]
+constexpr double kFarOff = 1.5;                           // of a wish, or the wish of it [-]
 
 }  // namespace
 
 double budget_ms(const AskedLevel& asked, const std::string& command) {
   if (asked.budget.empty()) return 0;
-  const std::string number = asked.budget.ends_with("ms") ? asked.budget.substr(0, asked.budget.size() - 2) : asked.budget;
-  return parse_number(number, kLeastBudget, kMostBudget, command, "--budget");
+  return parse_milliseconds(asked.budget, kLeastBudget, kMostBudget, command, "--budget");
+}
+
+std::string far_from_wish(int wished, int nodes) {
+  if (nodes <= kFarOff * wished && wished <= kFarOff * nodes) return "";
+  char text[160];
+  std::snprintf(text, sizeof text, "level: the control mesh has %d nodes where --lod asks for %d, for its lattice goes by whole cells", nodes, wished);
+  return text;
 }
 
 void add_level_options(CLI::App& app, AskedLevel& asked) {
@@ -85,6 +93,10 @@ io::LoadedCreature at_level(const io::LoadedCreature& creature, const retarget::
   report.pieces = performer.mesh.pieces;
   report.bridged_cells = performer.mesh.bridged_cells;
   report.copied_cells = performer.mesh.copied_cells;
+  if (asked.lod != kAuto && cost.wished > 0) {
+    const std::string warning = far_from_wish(cost.wished, report.nodes);
+    if (!warning.empty()) level.target.report.warnings.push_back(warning);
+  }
   level.target.report.level = retarget::LevelReport{report.nodes, solved_nodes, cost.work_ms, budget_ms(asked, command)};
   return level;
 }

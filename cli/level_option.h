@@ -33,6 +33,9 @@ std::vector<retarget::LevelCost> levels_asked_among(const AskedLevel& asked, con
 std::vector<retarget::LevelCost> levels_within(const std::vector<retarget::LevelCost>& levels, const AskedLevel& asked,
                                                const std::string& command);
 
+/// The warning of a control mesh that has more than 1.5 times the nodes that were wished for, or less than 1 / 1.5 of them; else empty.
+std::string far_from_wish(int wished, int nodes);
+
 /// The creature at a level, in the place of the solved one, and what its report tells of it.
 io::LoadedCreature at_level(const io::LoadedCreature& creature, const retarget::Rig& rig, const retarget::LevelCost& cost,
                             const AskedLevel& asked, const std::string& command);

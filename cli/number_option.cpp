@@ -16,6 +16,13 @@ std::optional<double> number_in(const std::string& text, double least, double mo
   return value;
 }
 
+/// What stands before a unit, which may be left out and may have a space before it.
+std::string before_unit(const std::string& text, const std::string& unit) {
+  if (!text.ends_with(unit)) return text;
+  const std::size_t last = text.substr(0, text.size() - unit.size()).find_last_not_of(' ');
+  return text.substr(0, last == std::string::npos ? 0 : last + 1);
+}
+
 std::string complaint(const std::string& text, double least, double most) {
   char range[80];
   std::snprintf(range, sizeof range, " not in range %g to %g", least, most);
@@ -37,10 +44,22 @@ double parse_number(const std::string& text, double least, double most, const st
   return *value;
 }
 
+double parse_milliseconds(const std::string& text, double least, double most, const std::string& command, const std::string& option) {
+  const std::optional<double> value = number_in(before_unit(text, "ms"), least, most);
+  if (value) return *value;
+  char range[80];
+  std::snprintf(range, sizeof range, "' is no time from %g to %g ms", least, most);
+  throw UsageError(command, "option " + option, "'" + text + range, "Write it like 2ms.");
+}
+
 double parse_share(const std::string& text, const std::string& command, const std::string& option) {
   constexpr double kLeast = 1e-7, kMost = 0.5;
-  if (!text.ends_with('%')) return parse_number(text, kLeast, kMost, command, option);
-  return parse_number(text.substr(0, text.size() - 1), 100 * kLeast, 100 * kMost, command, option) / 100;
+  const double unit = text.ends_with('%') ? 100 : 1;
+  const std::optional<double> value = number_in(before_unit(text, "%"), unit * kLeast, unit * kMost);
+  if (value) return *value / unit;
+  char range[160];
+  std::snprintf(range, sizeof range, "' is no share of L from %g to %g, or from %.5f%% to %g%%", kLeast, kMost, 100 * kLeast, 100 * kMost);
+  throw UsageError(command, "option " + option, "'" + text + range, "Write it like 1% or 0.01.");
 }
 
 }  // namespace hydrostat::cli

@@ -98,8 +98,9 @@ std::string summary(const retarget::ReplayReport& report, const std::string& whe
 
 std::string failure(const retarget::Replay& run, const std::string& where, const std::string& motion_file, const std::string& way_up) {
   const bool diverged = run.termination == physics::Termination::kDiverged;
+  const std::string usual = diverged ? "try --method euler or more --nodes" : "try a higher --limit, more --nodes or a calmer clip";
   return one_line({where, "replay", diverged ? run.report.fall_cause : "the creature fell: " + run.report.fall_cause,
-                   motion_file + " shows it; " + (way_up.empty() ? "try a higher --limit, more --nodes or a calmer clip" : way_up)});
+                   motion_file + " shows it; " + (way_up.empty() ? usual : way_up)});
 }
 
 }  // namespace

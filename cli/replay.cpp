@@ -237,12 +237,16 @@ class Levels {
 };
 
 /// What a person is told of the level, before the replay's own line.
-void tell_level(const std::optional<retarget::LevelReport>& level, const std::string& where) {
+void tell_level(const retarget::RunReport& report, const std::string& where) {
+  const std::optional<retarget::LevelReport>& level = report.level;
   if (!level) return;
   char text[160];
   std::snprintf(text, sizeof text, ": on %d nodes (solved on %d), %.3g ms of counted work a frame of 1/60 s\n", level->nodes,
                 level->solved_nodes, level->work_ms);
   std::cout << where << text;
+  for (const std::string& warning : report.warnings) {
+    if (warning.starts_with("level: ")) std::cout << warning << ".\n";
+  }
 }
 
 /// A level may stay up and yet not get on.
@@ -311,7 +315,7 @@ int replay(const ReplayCommand& command) {
   if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
   if (!command.trace.empty()) write_trace(command, performer.world, performances.main().trace, every);
   const bool is_met = !chosen || chosen->report.is_met();
-  if (!command.json) tell_level(creature.target.report.level, command.directory);
+  if (!command.json) tell_level(creature.target.report, command.directory);
   if (!writer) {
     const int exit_code = write_motion(command, performer, creature.appearance, performances, way_up);
     if (chosen) tell_accuracy(*chosen, performer);

@@ -203,6 +203,7 @@ int simulate(const SimulateCommand& command) {
   Progress progress(std::cerr, progress_style(command.quiet));
   Stages stages(progress);
   io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
+  io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   retarget::RunReport report;
   std::optional<ChosenStep> chosen;
   if (command.accuracy.is_asked()) {
@@ -212,7 +213,6 @@ int simulate(const SimulateCommand& command) {
   }
   const retarget::SimulationOptions options = options_of(command, scene);
   warn_of_steps(scene);
-  io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   const retarget::Simulation simulation = std::visit(
       [&](auto& scenario) {
         auto written = retarget::written_scenario(scenario);

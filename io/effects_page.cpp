@@ -1,6 +1,7 @@
 #include "io/effects_page.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "io/svg_text.h"
 
@@ -18,6 +19,17 @@ std::string bar(double x, double y, double share, const char* colour, const std:
          "\" y=\"" + short_number(y + 11) + "\">" + text + "</text>";
 }
 
+/// Without what lies below round-off: two orders of the same sums differ by it.
+std::vector<EffectRow> rounded(std::vector<EffectRow> rows) {
+  constexpr double kRoundOff = 1e-11;  // per L
+  for (EffectRow& row : rows) {
+    for (double* difference : {&row.difference_length, &row.without_difference_length}) {
+      if (std::abs(*difference) < kRoundOff) *difference = 0;
+    }
+  }
+  return rows;
+}
+
 std::string guarded(const EffectRow& row) {
   return row.guard_steps == 0 ? "" : " (guard: " + std::to_string(row.guard_steps) + " steps)";
 }
@@ -26,7 +38,7 @@ std::string guarded(const EffectRow& row) {
 
 std::string effects_csv(const std::vector<EffectRow>& rows) {
   std::string csv = "effect,ms_per_sim_s,difference_length,stable,guard_steps,without_ms_per_sim_s,without_difference_length\n";
-  for (const EffectRow& row : rows) {
+  for (const EffectRow& row : rounded(rows)) {
     csv += row.effect + "," + short_number(row.ms_per_sim_s, 6) + "," + short_number(row.difference_length, 6) +
            (row.stable ? ",1," : ",0,") + std::to_string(row.guard_steps) + "," + short_number(row.without_ms_per_sim_s, 6) + "," +
            short_number(row.without_difference_length, 6) + "\n";
@@ -34,7 +46,8 @@ std::string effects_csv(const std::vector<EffectRow>& rows) {
   return csv;
 }
 
-std::string effects_svg(const std::string& subject, const std::vector<EffectRow>& rows) {
+std::string effects_svg(const std::string& subject, const std::vector<EffectRow>& measured) {
+  const std::vector<EffectRow> rows = rounded(measured);
   double most_ms = 1e-12, most_alone = 1e-12, most_without = 1e-12;
   for (const EffectRow& row : rows) {
     most_ms = std::max(most_ms, row.ms_per_sim_s);
@@ -79,7 +92,7 @@ std::string effects_page(const std::string& subject, const std::vector<EffectRow
       "<h1>Effects of " +
       escaped(subject) + "</h1>\n" + effects_svg(subject, rows) +
       "<table><tr><th>effect<th>ms a second<th>alone, to none [% L]<th>stable<th>steps by the guard<th>ms a second of all others<th>all others, to all [% L]</tr>\n";
-  for (const EffectRow& row : rows) {
+  for (const EffectRow& row : rounded(rows)) {
     html += "<tr><td>" + row.effect + "<td>" + short_number(row.ms_per_sim_s) + "<td>" + short_number(100 * row.difference_length) +
             "<td>" + (row.stable ? "yes" : "no") + "<td>" + std::to_string(row.guard_steps) + "<td>" + short_number(row.without_ms_per_sim_s) +
             "<td>" + short_number(100 * row.without_difference_length) + "</tr>\n";

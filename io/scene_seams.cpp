@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "io/scene_shapes.h"
+
 namespace hydrostat::io {
 namespace {
 
@@ -40,8 +42,8 @@ physics::FractureOf<Dim> read_seams(const TomlReader& root, const physics::Eleme
     const auto is_of_seam = [&](const physics::SeamFace& face) { return face.seam == static_cast<int>(s); };
     if (std::any_of(fracture.faces.begin(), fracture.faces.end(), is_of_seam)) continue;
     throw tables[s].refusal(tables[s].has("box_m") ? "box_m" : "normal", "the seam parts nothing of the body",
-                            "Let its plane run between elements of the body, in the body's own frame: unturned, its middle in the origin; of a "
-                            "part of it mark more than one element's width.");
+                            "Let its plane run between elements of the body, which unturned, in its own frame, reaches " +
+                                extent_in_words<Dim>(mesh.rest) + "; of a part of it mark more than one element's width.");
   }
   return fracture;
 }

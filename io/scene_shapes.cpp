@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "io/surface_mesh.h"
+#include "io/svg_text.h"
 
 namespace hydrostat::io {
 namespace {
@@ -20,6 +21,7 @@ using physics::VectorOf;
 
 constexpr double kLeastQuality = 5e-3;  // of a simplex [-]: flatter ones are slivers
 constexpr double kToldLoss = 0.01, kLargestLoss = 0.15;  // of the volume, by cells that are too large for the surface
+constexpr double kRoundOff = 1e-9;  // [m] of places that are told
 constexpr long kFewestNodes = 4, kMostNodes = 50000;
 
 template <int Dim>
@@ -283,6 +285,16 @@ physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, 
 }
 
 template <int Dim>
+std::string extent_in_words(const PointsOf<Dim>& points) {
+  const auto list = [](const VectorOf<Dim>& place) {
+    std::string text;
+    for (const double value : place) text += (text.empty() ? "" : ", ") + short_number(std::abs(value) < kRoundOff ? 0 : value);
+    return "[" + text + "]";
+  };
+  return "from " + list(points.rowwise().minCoeff()) + " to " + list(points.rowwise().maxCoeff());
+}
+
+template <int Dim>
 std::vector<char> points_within(const TomlReader& table, const PointsOf<Dim>& points) {
   std::vector<char> within(static_cast<std::size_t>(points.cols()), 1);
   if (table.has("box_m") && table.has("normal")) {
@@ -303,7 +315,7 @@ std::vector<char> points_within(const TomlReader& table, const PointsOf<Dim>& po
   }
   if (std::count(within.begin(), within.end(), 1) == 0) {
     throw table.refusal(table.has("box_m") ? "box_m" : "normal", "nothing of the body lies there",
-                        "Give the place in the body's own frame: unturned, its middle in the origin.");
+                        "Give the place in the body's own frame, unturned: what can be marked lies " + extent_in_words<Dim>(points) + ".");
   }
   return within;
 }
@@ -313,6 +325,7 @@ std::vector<char> points_within(const TomlReader& table, const PointsOf<Dim>& po
   template ClosedMeshOf<Dim> surface_of<Dim>(const TomlReader&, std::vector<std::string>&);                 \
   template physics::ElementMesh<Dim> body_mesh<Dim>(const TomlReader&, std::string&, std::string&,          \
                                                     Eigen::MatrixXi&, std::vector<std::string>&);           \
+  template std::string extent_in_words<Dim>(const PointsOf<Dim>&);                                          \
   template std::vector<char> points_within<Dim>(const TomlReader&, const PointsOf<Dim>&);
 HYDROSTAT_INSTANTIATE(2)
 HYDROSTAT_INSTANTIATE(3)

@@ -29,6 +29,10 @@ template <int Dim>
 physics::ElementMesh<Dim> body_mesh(const TomlReader& body, std::string& shape, std::string& element,
                                     Eigen::MatrixXi& cells, std::vector<std::string>& warnings);
 
+/// "from [-1, 0] to [1, 2]": where points lie, Dim x P [m], P > 0.
+template <int Dim>
+std::string extent_in_words(const physics::PointsOf<Dim>& points);
+
 /// Which points (Dim x P, in the body's own frame) lie in the part that `table` names: `box_m`, or `normal` with `offset_m`; all
 /// where it names none. Throws Error where no point does.
 template <int Dim>

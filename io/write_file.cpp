@@ -5,11 +5,13 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <system_error>
 
+#include "io/writable.h"
 #include "io/write_error.h"
 
 namespace hydrostat::io {
@@ -80,6 +82,17 @@ void write_file(const std::filesystem::path& file, std::string_view bytes, const
 }
 
 void write_file(const std::filesystem::path& file, std::string_view bytes) { write_file(file, bytes, file); }
+
+void refuse_unwritable(const std::filesystem::path& directory) {
+  std::error_code failed;
+  if (!directory.empty()) std::filesystem::create_directories(directory, failed);
+  if (failed) throw write_error(directory, failed.value());
+  std::string name = (directory / ".hydrostat-XXXXXX").string();
+  const int descriptor = mkstemp(name.data());
+  if (descriptor < 0) throw write_error(directory, errno);
+  close(descriptor);
+  std::filesystem::remove(name, failed);
+}
 
 std::string read_file(const std::filesystem::path& file) {
   std::ifstream stream;

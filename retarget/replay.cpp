@@ -6,6 +6,7 @@
 
 #include "physics/effect.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/divergence.h"
 #include "retarget/fall.h"
 #include "retarget/leaps.h"
 #include "retarget/obstacle_moves.h"
@@ -295,7 +296,10 @@ physics::Termination Run::advance() {
     termination = stepper_->step(options_.step_s, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
     if (looks) strength_->look(options_.step_s, before_, state_, activation_, impulses_);
     physics::add(impulses_, step_impulses_);
-    if (termination == physics::Termination::kDiverged) break;
+    if (termination == physics::Termination::kDiverged) {
+      time_s_ = begin;  // of the state that is left
+      return termination;
+    }
   }
   time_s_ += control_s_;
   return termination;
@@ -336,8 +340,8 @@ Replay Run::play() {
     result_.termination = advance();
     busy_s_ += thread_seconds() - began;
     if (result_.termination == physics::Termination::kDiverged) {
-      fall_ =
-          Fall{time_s_, "the simulation diverged: " + fall_cause(input_, state_, reference_, fit_, activation_, time_s_)};
+      fall_ = Fall{time_s_, "the simulation diverged: " +
+                                divergence_cause(input_.scene.body, state_, options_.method, options_.step_s, time_s_)};
       break;
     }
     measure(step);

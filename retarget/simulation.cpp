@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "physics/effect.h"
 #include "physics/internal_forces.h"
 #include "physics/self_contact.h"
 #include "physics/tearing.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/divergence.h"
 #include "retarget/obstacle_moves.h"
 #include "retarget/simulation_record.h"
 
@@ -286,13 +286,7 @@ void Course<Dim>::tell_divergence() {
   SimulationReport& report = result_.report;
   report.diverged = true;
   report.diverged_time_s = static_cast<double>(done_) * options_.dt_s;
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "at %.3f s no step of %g s by the method '%s' led to a finite state; before it the fastest node moved at %.3g m/s and %ld "
-                "elements were inverted",
-                report.diverged_time_s, options_.dt_s, physics::name_of(options_.method).c_str(), state_.v.colwise().norm().maxCoeff(),
-                static_cast<long>((physics::jacobians(body_, state_.x).array() <= 0).count()));
-  report.diverged_cause = text;
+  report.diverged_cause = divergence_cause(body_, state_, options_.method, options_.dt_s, report.diverged_time_s);
 }
 
 template <int Dim>

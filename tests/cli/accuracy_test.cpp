@@ -186,6 +186,9 @@ TEST(ChosenStep, OfADraftCostsLessThanOfAFinalAndBothKeepTheirError) {
     ChosenStep chosen = choose_step({"", grade}, "hydrostat convert", performer, signals, std::nullopt);
     EXPECT_TRUE(chosen.report.is_met()) << grade;
     EXPECT_LE(chosen.report.estimated_error_length, chosen.report.max_error_length) << grade;
+    const retarget::AccuracyRow& row = chosen.curve.rows.at(static_cast<std::size_t>(chosen.curve.recommended));
+    EXPECT_GE(row.error_rms_m, row.loop_error_m) << grade;
+    EXPECT_NEAR(chosen.report.estimated_error_length, row.error_rel_length + chosen.curve.floor, 1e-12) << grade;
     return chosen;
   };
   const auto work_ms = [](const ChosenStep& chosen) { return chosen.curve.rows.at(static_cast<std::size_t>(chosen.curve.recommended)).work_ms; };

@@ -65,6 +65,26 @@ TEST(Bench, ScalingRefusesWhatItCannotRead) {
   EXPECT_EQ(hydrostat_in(directory.path, "bench").exit_code, 2);
 }
 
+TEST(Bench, AndSimulateRefuseAnOutputThatCannotBeWrittenBeforeTheyMeasure) {
+  const TemporaryDirectory directory;
+  io::write_file(directory.path / "scene.toml",
+                 "dimension = 2\nduration_s = 60.0\n[body]\nshape = \"square\"\nsize_m = 0.4\nnodes = 200\nposition_m = [0.0, 0.3]\n[ground]\n");
+  for (const std::string command : {"bench accuracy scene.toml --max-error 0.001% --duration 60", "bench effects scene.toml --duration 60",
+                                    "bench scaling scene.toml", "bench import '" HYDROSTAT_SAMPLES "/worm_crawl.glb'",
+                                    "bench speed '" HYDROSTAT_SAMPLES "/worm_crawl.glb'", "simulate scene.toml --max-error 0.001%"}) {
+    SCOPED_TRACE(command);
+    // Seconds of the processor, which measuring would take and more.
+    const std::string limited = "cd '" + directory.path.string() + "' && ulimit -t 3 && '" HYDROSTAT_BINARY "' " + command +
+                                " -o scene.toml/out >told 2>complained";
+    const int status = std::system(limited.c_str());
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << status;
+    const std::string complained = io::read_file(directory.path / "complained");
+    EXPECT_NE(complained.find("scene.toml/out"), std::string::npos) << complained;
+    EXPECT_NE(complained.find("cannot be written: Not a directory. A file stands where a directory is needed"), std::string::npos) << complained;
+    EXPECT_EQ(io::read_file(directory.path / "told").find("worm_crawl"), std::string::npos);
+  }
+}
+
 TEST(GrowthExponent, IsThePowerThatTimesFollow) {
   for (const double power : {0.0, 1.0, 1.5}) {
     std::vector<retarget::ScalingRow> rows;

@@ -6,6 +6,9 @@
 #include <random>
 #include <set>
 
+#include "cli/command_line.h"
+#include "cli/level_option.h"
+#include "cli/outcome.h"
 namespace hydrostat::cli::level_trial_test {
 namespace {
 
@@ -52,6 +55,30 @@ TEST(LevelTrial, TriesNoMoreThanAMinuteOfCountedWork) {
   EXPECT_EQ(try_levels(kLevels, 0, 1000, 1, none).lost.size(), 6U);
   EXPECT_EQ(try_levels(kLevels, 0, 1000, 600, none).lost, (std::vector<int>{12, 24}));  // 18, 36, then 72 s
   EXPECT_TRUE(try_levels(kLevels, 0, 1000, 2001, none).lost.empty());
+}
+
+TEST(LevelOption, WarnsOfAMeshThatIsFarFromTheWishAlone) {
+  using Pairs = std::vector<std::pair<int, int>>;
+  for (const auto& [wished, nodes] : Pairs{{24, 16}, {24, 24}, {24, 36}, {100, 67}, {100, 150}}) EXPECT_EQ(far_from_wish(wished, nodes), "") << nodes;
+  for (const auto& [wished, nodes] : Pairs{{24, 15}, {24, 12}, {24, 37}, {24, 48}, {100, 66}, {100, 151}}) {
+    EXPECT_EQ(far_from_wish(wished, nodes), "level: the control mesh has " + std::to_string(nodes) + " nodes where --lod asks for " + std::to_string(wished) +
+                                                ", for its lattice goes by whole cells");
+  }
+}
+
+TEST(Outcome, OfADivergenceIsNoFallAndWantsNoHigherLimit) {
+  retarget::Replay run;
+  const auto told = [&run](const std::string& way_up) {
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(tell_run(run, "creature", "failed.glb", way_up), kShortOfTarget);
+    return testing::internal::GetCapturedStderr();
+  };
+  run.report.fell = true;
+  run.report.fall_cause = "it was so";
+  EXPECT_EQ(told(""), "creature: replay: the creature fell: it was so. failed.glb shows it; try a higher --limit, more --nodes or a calmer clip.\n");
+  run.termination = physics::Termination::kDiverged;
+  EXPECT_EQ(told(""), "creature: replay: it was so. failed.glb shows it; try --method euler or more --nodes.\n");
+  EXPECT_EQ(told("take another"), "creature: replay: it was so. failed.glb shows it; take another.\n");
 }
 
 TEST(LevelTrial, TellsWhatIsKnownAndHowToMend) {

@@ -58,6 +58,16 @@ TEST_F(Replay, OnOtherLevelsIsTheSameEachTimeAndRefusesWhatCannotBe) {
   const std::string told = level("--lod 60 --threads 1", "one.glb");
   EXPECT_NE(told.find("(solved on "), std::string::npos) << told;
   level("--lod 60 --threads 2", "two.glb");
+  bool is_warned = false, is_near = false;
+  for (const int wished : {20, 24, 28, 60}) {
+    const std::string words = replay("--duration 0.1 -o wished.glb --lod " + std::to_string(wished)).out;
+    ASSERT_NE(words.find(": on "), std::string::npos) << words;
+    const int nodes = std::stoi(words.substr(words.find(": on ") + 5));
+    const bool is_far = nodes > 1.5 * wished || wished > 1.5 * nodes;
+    EXPECT_EQ(words.find("level: the control mesh has " + std::to_string(nodes) + " nodes where --lod asks for ") != std::string::npos, is_far) << words;
+    (is_far ? is_warned : is_near) = true;
+  }
+  EXPECT_TRUE(is_warned && is_near);
   EXPECT_EQ(io::read_file(directory_.path / "one.glb"), io::read_file(directory_.path / "two.glb"));
   const Outcome too_little = replay("--lod auto --budget 0.001ms");
   EXPECT_EQ(too_little.exit_code, 2);

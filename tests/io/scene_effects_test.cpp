@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/effects_page.h"
 #include "io/scene_file.h"
 #include "io/write_file.h"
 #include "retarget/accuracy.h"
@@ -253,6 +254,26 @@ TEST_F(SceneEffects, AloneAndTogetherAreMeasured) {
   EXPECT_EQ(rows[0].without_difference_length, 0);
   EXPECT_EQ(rows[5].without_difference_length, rows[5].difference_length);
   EXPECT_EQ(rows[5].without_ms_per_sim_s, rows[0].ms_per_sim_s);
+}
+
+TEST(EffectsPicture, TellsWhatIsBelowRoundOffAsNothing) {
+  for (const double noise : {1.34e-15, -1.34e-15, 9e-12}) {
+    retarget::EffectRow gravity, nothing;
+    gravity.effect = "gravity";
+    gravity.difference_length = 0.25;
+    gravity.without_difference_length = 1.5e-11;  // what is above it stays
+    nothing = gravity;
+    nothing.effect = "damping";
+    nothing.difference_length = nothing.without_difference_length = noise;
+    const std::vector<retarget::EffectRow> noisy{gravity, nothing};
+    nothing.difference_length = nothing.without_difference_length = 0;
+    const std::vector<retarget::EffectRow> clean{gravity, nothing};
+    EXPECT_EQ(effects_svg("scene", noisy), effects_svg("scene", clean));
+    EXPECT_EQ(effects_page("scene", noisy), effects_page("scene", clean));
+    EXPECT_EQ(effects_csv(noisy), effects_csv(clean));
+    EXPECT_NE(effects_svg("scene", noisy).find(">1.5e-09<"), std::string::npos);
+    EXPECT_NE(effects_svg("scene", noisy).find(">25<"), std::string::npos);
+  }
 }
 
 /// Without weight nothing comes to the ground: what it does shows where it alone is missing.

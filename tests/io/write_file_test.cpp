@@ -5,6 +5,7 @@
 
 #include <csignal>
 
+#include "io/writable.h"
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
 
@@ -70,6 +71,21 @@ TEST(WriteFile, RefusesADirectoryWhereTheFileBelongs) {
   const std::string told = refusal([&] { write_file(directory.path / "file", "x"); });
   EXPECT_NE(told.find("Is a directory|A directory stands where the file belongs"), std::string::npos) << told;
   EXPECT_EQ(directory.count(), 1U);
+}
+
+TEST(RefuseUnwritable, MakesTheDirectoryLeavesNothingInItAndRefusesLikeTheFilesThatWouldCome) {
+  const TemporaryDirectory directory;
+  for (int times = 0; times < 2; ++times) {  // missing, and there
+    refuse_unwritable(directory.path / "a" / "b");
+    EXPECT_TRUE(std::filesystem::is_empty(directory.path / "a" / "b"));
+  }
+  write_file(directory.path / "file", "");
+  for (const std::filesystem::path& place : {directory.path / "file", directory.path / "file" / "a" / "b", std::filesystem::path("/proc/out")}) {
+    const std::string told = refusal([&] { refuse_unwritable(place); });
+    EXPECT_TRUE(told.starts_with(place.string() + "||cannot be written: ")) << told;
+    const std::string later = refusal([&] { write_file(place / "table.csv", "x"); });
+    EXPECT_EQ(told.substr(place.string().size()), later.substr((place / "table.csv").string().size()));
+  }
 }
 
 TEST(ReadFile, RefusesWhatIsMissingOrADirectory) {

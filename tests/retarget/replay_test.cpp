@@ -123,6 +123,24 @@ TEST(Replay, AHardShoveIsAFallAndIsTold) {
   EXPECT_EQ(result.trace.count(), result.course.time_s.size() + 1);  // nothing is written of what was not simulated
 }
 
+TEST(Replay, WhereNoStepLeadsOnThatIsToldAndNoLimb) {
+  const Actor actor;
+  for (const physics::Method method : {physics::Method::kExplicit, physics::Method::kEuler, physics::Method::kSpring}) {
+    SCOPED_TRACE(physics::name_of(method));
+    ReplayOptions options = lasting(1);
+    options.method = method;
+    options.pushes = {{0.1, 0.1, Eigen::Vector3d(1e200, 0, 0)}};  // no number holds the square of such a speed
+    const Replay result = replay(actor.input(), options);
+    EXPECT_EQ(result.termination, physics::Termination::kDiverged);
+    EXPECT_NEAR(result.report.fall_time_s, 0.1, options.step_s);
+    const std::string& cause = result.report.fall_cause;
+    EXPECT_TRUE(cause.starts_with("the simulation diverged: at 0.")) << cause;
+    for (const std::string& words : {"by the method '" + physics::name_of(method) + "' led to a finite state", std::string(" m/s and 0 elements were inverted")})
+      EXPECT_NE(cause.find(words), std::string::npos) << cause;
+    for (const char* words : {"limb", "limit", "frame"}) EXPECT_EQ(cause.find(words), std::string::npos) << cause;
+  }
+}
+
 TEST(Replay, ABodyBelowHalfItsHeightHasFallen) {
   // The target hovers three times as high as the body stands; the body drops.
   Actor actor;

@@ -18,6 +18,7 @@
 #include "io/gltf_out.h"
 #include "io/load_creature.h"
 #include "io/trace_writer.h"
+#include "io/writable.h"
 #include "retarget/error.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
@@ -278,6 +279,8 @@ int replay(const ReplayCommand& command) {
   retarget::PerformOptions options = perform_options(command, creature);
   const WobbleChoice wobble(command.wobble, command.level.is_asked(), command.directory, creature);
   check_scene(command, creature);
+  if (!command.out.empty()) io::refuse_unwritable(fs::path(command.out).parent_path());
+  if (!command.trace.empty()) io::refuse_unwritable(command.trace);
   Levels levels(command, creature, options, stages);
   wobble.plan(creature.target.performer);
   std::optional<ChosenStep> chosen;

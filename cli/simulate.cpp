@@ -17,6 +17,7 @@
 #include "io/report.h"
 #include "io/simulation_files.h"
 #include "io/trace_writer.h"
+#include "io/writable.h"
 #include "retarget/accuracy.h"
 #include "retarget/step_warning.h"
 
@@ -203,6 +204,7 @@ int simulate(const SimulateCommand& command) {
   Progress progress(std::cerr, progress_style(command.quiet));
   Stages stages(progress);
   io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
+  if (!command.trace.empty()) io::refuse_unwritable(command.trace);
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   retarget::RunReport report;
   std::optional<ChosenStep> chosen;

@@ -39,6 +39,8 @@ class ContactSet {
   bool is_empty() const { return slot_count() == 0; }
   bool has_internal() const { return !itself_.is_empty(); }
   int slot_count() const { return slot_count_ + itself_.slot_count(); }
+  /// Pairs of place and surface that a find looks through: those of the body with itself do not count.
+  int searched() const { return slot_count_; }
   /// Chooses as candidates all that may come to touch while no place moves more than `reach` [m], against the body itself while
   /// none moves more than `own_reach`.
   void find(const StateOf<Dim>& state, double reach, double own_reach);

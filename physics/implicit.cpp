@@ -75,7 +75,7 @@ class ImplicitStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / longest_substep_); }
 
-  StepWork work() const override { return work_; }
+  StepWork work() const override { return work_ + contact_.work(); }
 
   void forget() override { contact_.forget(); }
 

@@ -43,7 +43,7 @@ class XpbdStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / substep_); }
 
-  StepWork work() const override { return work_; }
+  StepWork work() const override { return work_ + contact_.work(); }
 
   void forget() override { contact_.forget(); }
 

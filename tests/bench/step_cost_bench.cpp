@@ -1,8 +1,9 @@
 // How far counted work (retarget/step_cost.h) is from processor time: bars in the plane and in space, of springs, of triangles or
-// tets and of quads or hexahedra, soft and stiff, held in the air, held in water and lying on the ground, with activations and
-// without, by every method in short and long steps. Usage: step_cost_bench [-o DIR] [-r ROUNDS]. Writes DIR/costs.csv (default DIR:
-// out/costs), a line a run with what was counted and the least time of ROUNDS (4), and prints in markdown for each method and kind of
-// body the median of counted over measured, and within what nine of ten lie.
+// tets and of quads or hexahedra, soft and stiff, held in the air, held in water, lying on the ground and on a ball, with
+// activations and without, by every method in short and long steps. Usage: step_cost_bench [-o DIR] [-r ROUNDS] [-f FIT [-k SLOWER]]. Writes
+// DIR/costs.csv (default DIR: out/costs), a line a run with what was counted and the least time of ROUNDS (4), and prints in
+// markdown for each method and kind of body the median of counted over measured, and within what nine of ten lie. FIT: a file for
+// the table of constants that these times ask for, of a machine that is SLOWER times as slow as this one (1).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,8 +17,10 @@
 #include <vector>
 
 #include "io/scene_file.h"
+#include "retarget/least_squares.h"
 #include "retarget/simulation.h"
 #include "retarget/step_cost.h"
+#include "retarget/step_parts.h"
 
 namespace hydrostat::bench {
 namespace {
@@ -34,7 +37,7 @@ struct Surroundings {
   const char* name;
   bool is_active;  // activations change from step to step
 };
-constexpr std::array<Surroundings, 4> kSurroundings{{{"air", true}, {"air", false}, {"ground", true}, {"water", true}}};
+constexpr std::array<Surroundings, 5> kSurroundings{{{"air", true}, {"air", false}, {"ground", true}, {"ball", true}, {"water", true}}};
 
 struct Kind {
   const char *element, *law;
@@ -112,7 +115,7 @@ void take(Run& run) {
 void write_csv(const std::vector<Run>& runs, const fs::path& file) {
   std::ofstream csv(file);
   csv << "kind,surroundings,active,youngs_modulus_pa,damping_s,method,dt_s,nodes,edges,springs,dashpots,volumes,elements,places,steps,passes,"
-         "sweeps,assemblies,products,rounds,plain,counted_ms,ms\n";
+         "sweeps,assemblies,products,rounds,searched,looks,pushes,plain,counted_ms,ms\n";
   for (const Run& run : runs) {
     const auto write = [&](const auto& scenario) {
       const auto& body = scenario.scene.body;
@@ -124,7 +127,8 @@ void write_csv(const std::vector<Run>& runs, const fs::path& file) {
           << run.dt_s << ',' << body.node_count() << ',' << body.edge_count() << ',' << (body.edge_stiffness.array() > 0).count() << ','
           << (body.edge_damping.array() > 0).count() << ',' << body.volume_stiffness.size() << ',' << elements << ','
           << scenario.scene.contact_points.count() << ',' << run.steps << ',' << run.work.passes << ',' << run.work.sweeps << ',' << run.work.assemblies << ','
-          << run.work.products << ',' << run.work.rounds << ',' << run.is_plain << ',' << run.counted_ms << ',' << run.least_ms << '\n';
+          << run.work.products << ',' << run.work.rounds << ',' << run.work.searched << ',' << run.work.looks << ','
+          << run.work.pushes << ',' << run.is_plain << ',' << run.counted_ms << ',' << run.least_ms << '\n';
     };
     std::visit(write, run.scene.scenario);
   }
@@ -149,16 +153,148 @@ void print_table(const std::vector<Run>& runs) {
   }
 }
 
+using retarget::StepCosts;
+using retarget::StepParts;
+
+struct Part {
+  const char* name;
+  double StepParts::*value;
+};
+constexpr std::array<Part, 12> kParts{{{"one", &StepParts::one}, {"nodes", &StepParts::nodes}, {"edges", &StepParts::edges},
+                                       {"springs", &StepParts::springs}, {"dashpots", &StepParts::dashpots}, {"volumes", &StepParts::volumes},
+                                       {"simplices", &StepParts::simplices}, {"corotated", &StepParts::corotated}, {"boxes", &StepParts::boxes},
+                                       {"active_simplices", &StepParts::active_simplices}, {"active_boxes", &StepParts::active_boxes},
+                                       {"wet", &StepParts::wet}}};
+constexpr Eigen::Index kPartCount = kParts.size(), kCostCount = 3 * kPartCount + 4;
+/// Where each of them stands in a vector of costs: of steps, passes, assemblies, and what is no part.
+enum : Eigen::Index { kStep = 0, kPass = kPartCount, kAssembly = 2 * kPartCount, kRest = 3 * kPartCount };
+
+/// How often a run paid each cost.
+Eigen::VectorXd counts_of(const Run& run) {
+  const StepParts parts = std::visit([&](const auto& scenario) { return retarget::parts_of(scenario.scene, run.surroundings.is_active); },
+                                     run.scene.scenario);
+  Eigen::VectorXd counts(kCostCount);
+  for (Eigen::Index p = 0; p < kPartCount; ++p) {
+    const double of_part = parts.*kParts[static_cast<std::size_t>(p)].value;
+    counts[kStep + p] = run.steps * of_part;
+    counts[kPass + p] = (run.work.passes + run.work.sweeps) * of_part;
+    counts[kAssembly + p] = run.work.assemblies * of_part;
+  }
+  counts.tail<4>() << run.work.products, run.work.searched, run.work.looks, run.work.pushes;
+  return counts;
+}
+
+/// Whether a method pays for a cost at all.
+bool is_paid(physics::Method method, Eigen::Index cost) {
+  if (cost >= kRest) return true;
+  const double StepParts::*part = kParts[static_cast<std::size_t>(cost % kPartCount)].value;
+  const bool is_active = part == &StepParts::active_simplices || part == &StepParts::active_boxes;
+  const bool is_of_elements = is_active || part == &StepParts::volumes || part == &StepParts::simplices ||
+                              part == &StepParts::corotated || part == &StepParts::boxes;
+  if (method == physics::Method::kSpring && is_of_elements) return false;  // which it leaves out
+  if (cost >= kAssembly && is_active) return false;                        // set before
+  return cost < kPass || part != &StepParts::wet;
+}
+
+using Costs = std::map<physics::Method, Eigen::VectorXd>;
+
+/// Costs [ns] of methods, none below 0, that come nearest to the times of `runs`, by relative error. Those of `common` are one for all of
+/// these methods.
+Costs fitted(const std::vector<Run>& runs, std::size_t dimension, const std::vector<physics::Method>& methods,
+             const std::vector<Eigen::Index>& common) {
+  constexpr double kHold = 1e-3;  // of what a cost that stands alone would be worth [-]: of two that go together neither runs away
+  const auto column = [&](std::size_t m, Eigen::Index cost) {
+    const bool is_common = std::find(common.begin(), common.end(), cost) != common.end();
+    return static_cast<Eigen::Index>(is_common ? 0 : m) * kCostCount + cost;
+  };
+  std::vector<Eigen::VectorXd> rows;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    for (const Run& run : runs) {
+      if (!run.is_plain || run.method != methods[m] || run.scene.scenario.index() != dimension) continue;
+      const Eigen::VectorXd shares = 1e-6 / run.least_ms * counts_of(run);
+      rows.push_back(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(methods.size()) * kCostCount));
+      for (Eigen::Index c = 0; c < kCostCount; ++c) {
+        if (is_paid(run.method, c)) rows.back()[column(m, c)] = shares[c];
+      }
+          }
+  }
+  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(methods.size()) * kCostCount);
+  for (std::size_t r = 0; r < rows.size(); ++r) matrix.row(static_cast<Eigen::Index>(r)) = rows[r];
+  const Eigen::VectorXd lengths = matrix.colwise().norm().cwiseMax(1e-300).transpose();
+  matrix.array().rowwise() /= lengths.transpose().array();
+  const Eigen::VectorXd target = Eigen::VectorXd::Ones(matrix.rows());
+  const retarget::BoundedSolution solution =
+      retarget::solve(retarget::held_nonnegative(matrix, target, kHold), Eigen::VectorXd::Ones(matrix.cols()));
+  if (!solution.converged) std::fprintf(stderr, "step_cost_bench: the fit: did not settle (%g)\n", solution.kkt_residual);
+  Costs costs;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    Eigen::VectorXd& own = costs[methods[m]] = Eigen::VectorXd::Zero(kCostCount);
+    for (Eigen::Index c = 0; c < kCostCount; ++c) {
+      if (is_paid(methods[m], c) && lengths[column(m, c)] > 1e-200) own[c] = solution.x[column(m, c)] / lengths[column(m, c)];
+    }
+  }
+  return costs;
+}
+
+/// As it is written in retarget/step_cost.cpp.
+void write_costs(const Eigen::VectorXd& costs, physics::Method method, std::ofstream& out) {
+  const auto number = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, value < 1e4 ? "%.2g" : "%.0f", value);
+    return std::to_string(std::stod(text)).find(".000000") != std::string::npos ? std::to_string(std::lround(std::stod(text))) : std::string(text);
+  };
+  out << "        {";
+  for (const Eigen::Index block : {kStep, kPass, kAssembly}) {
+    out << (block == kStep ? "{" : ",\n         {");
+    const char* comma = "";
+    for (Eigen::Index p = 0; p < kPartCount; ++p) {
+      if (costs[block + p] < 0.05) continue;
+      out << comma << '.' << kParts[static_cast<std::size_t>(p)].name << " = " << number(costs[block + p]);
+      comma = ", ";
+    }
+    out << '}';
+  }
+  for (Eigen::Index k = 0; k < 4; ++k) out << (k == 0 ? ",\n         " : ", ") << number(costs[kRest + k]);
+  out << "},  // " << physics::name_of(method) << '\n';
+}
+
+/// Contact is one code for `explicit`, `xpbd` and `spring`, another for `implicit` and `euler`, whose passes are one too; what `explicit`
+/// assembles is its guard, `euler`.
+void write_fit(const std::vector<Run>& runs, double slower, const fs::path& file) {
+  using enum physics::Method;
+  std::ofstream out(file);
+  std::vector<double> ratios;
+  for (const std::size_t dimension : {0U, 1U}) {
+    std::vector<Eigen::Index> penalty{kRest + 1, kRest + 2, kRest + 3};
+    const std::vector<Eigen::Index> impulses = penalty;
+    for (Eigen::Index p = 0; p < kPartCount; ++p) penalty.push_back(kPass + p);
+    Costs costs = fitted(runs, dimension, {kImplicit, kEuler}, penalty);
+    for (const auto& [method, own] : fitted(runs, dimension, {kExplicit, kXpbd, kSpring}, impulses)) costs[method] = own;
+    costs[kExplicit].segment<kPartCount + 1>(kAssembly) = costs[kEuler].segment<kPartCount + 1>(kAssembly);
+    out << "    {\n";
+    for (const physics::Method method : physics::kMethods) write_costs(slower * costs[method], method, out);
+    out << "    },\n";
+    for (const Run& run : runs) {
+      if (run.is_plain && run.scene.scenario.index() == dimension) ratios.push_back(1e-6 * costs[run.method].dot(counts_of(run)) / run.least_ms);
+    }
+  }
+  std::printf("The fit over measured: half within %.2f and %.2f, nine of ten within %.2f and %.2f.\n", quantile(ratios, 0.25), quantile(ratios, 0.75),
+              quantile(ratios, 0.05), quantile(ratios, 0.95));
+}
+
 }  // namespace
 }  // namespace hydrostat::bench
 
 int main(int argc, char** argv) {
   using namespace hydrostat::bench;
-  fs::path out = "out/costs";
+  fs::path out = "out/costs", fit;
   int rounds = 4;
+  double slower = 1;
   for (int k = 1; k + 1 < argc; k += 2) {
     const std::string option = argv[k];
     if (option == "-o") out = argv[k + 1];
+    if (option == "-f") fit = argv[k + 1];
+    if (option == "-k") slower = std::atof(argv[k + 1]);
     if (option == "-r") rounds = std::max(1, std::atoi(argv[k + 1]));
   }
   fs::create_directories(out);
@@ -169,4 +305,5 @@ int main(int argc, char** argv) {
   }
   write_csv(runs, out / "costs.csv");
   print_table(runs);
+  if (!fit.empty()) write_fit(runs, slower, fit);
 }

@@ -132,6 +132,15 @@ TEST_F(Replay, WobblesInThePictureAlone) {
   EXPECT_EQ(replay("--wobble perhaps").exit_code, 2);
 }
 
+TEST_F(Replay, RefusesWhatCannotBeWrittenBeforeItMeasuresAnything) {
+  io::write_file(directory_.path / "file", "");
+  for (const std::string output : {"-o file/motion.glb", "-o motion.glb --trace file/trace"}) {
+    const Outcome outcome = replay(output + " --lod auto --budget 1e-6ms");  // which no level meets, as measuring would tell
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.err.find("cannot be written: Not a directory"), std::string::npos) << outcome.err;
+  }
+}
+
 TEST_F(Replay, WithAFileOfItsOwnLeavesTheCreatureAlone) {
   const std::string motion = motion_bytes(creature_), report = io::read_file(creature_ / "report.json");
   const std::set<std::string> files = names_in(creature_);

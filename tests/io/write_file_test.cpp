@@ -73,12 +73,16 @@ TEST(WriteFile, RefusesADirectoryWhereTheFileBelongs) {
   EXPECT_EQ(directory.count(), 1U);
 }
 
-TEST(RefuseUnwritable, MakesTheDirectoryLeavesNothingInItAndRefusesLikeTheFilesThatWouldCome) {
+TEST(RefuseUnwritable, LeavesNothingAndRefusesLikeTheFilesThatWouldCome) {
   const TemporaryDirectory directory;
-  for (int times = 0; times < 2; ++times) {  // missing, and there
-    refuse_unwritable(directory.path / "a" / "b");
-    EXPECT_TRUE(std::filesystem::is_empty(directory.path / "a" / "b"));
-  }
+  refuse_unwritable(directory.path / "a" / "b");
+  refuse_unwritable(directory.path / "a" / "b" / "");
+  EXPECT_TRUE(std::filesystem::is_empty(directory.path));
+  std::filesystem::create_directory(directory.path / "a");
+  refuse_unwritable(directory.path / "a" / "b");
+  EXPECT_EQ(directory.count(), 1U);
+  EXPECT_TRUE(std::filesystem::is_empty(directory.path / "a"));
+  std::filesystem::remove(directory.path / "a");
   write_file(directory.path / "file", "");
   for (const std::filesystem::path& place : {directory.path / "file", directory.path / "file" / "a" / "b", std::filesystem::path("/proc/out")}) {
     const std::string told = refusal([&] { refuse_unwritable(place); });

@@ -17,7 +17,6 @@
 #include "io/report.h"
 #include "io/simulation_files.h"
 #include "io/trace_writer.h"
-#include "io/writable.h"
 #include "retarget/accuracy.h"
 #include "retarget/step_warning.h"
 
@@ -204,7 +203,13 @@ int simulate(const SimulateCommand& command) {
   Progress progress(std::cerr, progress_style(command.quiet));
   Stages stages(progress);
   io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
-  if (!command.trace.empty()) io::refuse_unwritable(command.trace);
+  if (!command.trace.empty()) {
+    io::refuse_trace(command.trace);
+    const auto whole = [](const std::string& path) { return (std::filesystem::weakly_canonical(path) / "").lexically_normal(); };
+    if (whole(command.trace) == whole(command.out)) {
+      throw UsageError(kCommand, "option --trace", "'" + command.trace + "' is where the outcome goes", "Name another folder, which may lie in it.");
+    }
+  }
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   retarget::RunReport report;
   std::optional<ChosenStep> chosen;
@@ -252,8 +257,8 @@ int simulate(const SimulateCommand& command) {
   } catch (const Error& error) {
     throw writer.as_seen(error);
   }
-  if (!command.trace.empty()) io::write_trace(command.trace, simulation.trace);
   writer.commit();
+  if (!command.trace.empty()) io::write_trace(command.trace, simulation.trace);  // which may lie in the outcome
   return tell(command, report);
 }
 

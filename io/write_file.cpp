@@ -87,7 +87,8 @@ void write_file(const std::filesystem::path& file, std::string_view bytes) { wri
 void refuse_unwritable(const std::filesystem::path& directory) {
   std::error_code failed;
   std::vector<std::filesystem::path> made;  // the deepest first
-  for (std::filesystem::path place = directory; !place.empty() && !std::filesystem::exists(place, failed); place = place.parent_path()) {
+  for (std::filesystem::path place = directory; !place.empty(); place = place.parent_path()) {
+    if (std::filesystem::exists(std::filesystem::symlink_status(place, failed))) break;
     made.push_back(place);
   }
   if (!directory.empty()) std::filesystem::create_directories(directory, failed);
@@ -99,6 +100,11 @@ void refuse_unwritable(const std::filesystem::path& directory) {
   if (descriptor >= 0) std::filesystem::remove(name, failed);
   for (const std::filesystem::path& place : made) std::filesystem::remove(place, failed);  // those that are empty
   if (cannot_write != 0) throw write_error(directory, cannot_write);
+}
+
+void refuse_unwritable_file(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file)) throw write_error(file, EISDIR);
+  refuse_unwritable(file.parent_path());
 }
 
 std::string read_file(const std::filesystem::path& file) {

@@ -54,7 +54,11 @@ class EulerStepper final : public StepperOf<Dim> {
   /// Steps that ended above the minimum.
   long guard_steps() const override { return unsolved_; }
 
-  StepWork work() const override { return work_ + contact_.work(); }
+  StepWork work() const override {
+    StepWork work = work_;
+    work.by_potential = contact_.work();
+    return work;
+  }
 
   void forget() override { contact_.forget(); }
 

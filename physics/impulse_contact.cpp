@@ -22,11 +22,17 @@ ImpulseContact<Dim>::ImpulseContact(const SceneOf<Dim>& scene)
 }
 
 template <int Dim>
+ContactWork ImpulseContact<Dim>::work() const {
+  ContactWork work = set_.work();
+  work.pushes += pushes_;
+  return work;
+}
+
+template <int Dim>
 void ImpulseContact<Dim>::find_candidates(double farther, const StateOf<Dim>& state) {
   reach_ = kReach * shortest_edge_;
   const bool had_none = set_.candidates().empty();
   set_.find(state, reach_ + farther);
-  work_.searched += set_.searched();
   if (had_none && set_.candidates().empty()) return;
   std::fill(is_candidate_.begin(), is_candidate_.end(), 0);
   for (const ContactOf<Dim>& contact : set_.candidates()) is_candidate_[static_cast<std::size_t>(contact.slot)] = 1;
@@ -47,7 +53,6 @@ template <int Dim>
 void ImpulseContact<Dim>::gather_active(double h, StateOf<Dim>& state) {
   active_.clear();
   std::vector<ContactOf<Dim>>& candidates = set_.candidates();
-  work_.looks += static_cast<double>(candidates.size());
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     ContactOf<Dim>& contact = candidates[c];
     set_.update(state.x, state.obstacle_travel, contact);
@@ -66,7 +71,7 @@ void ImpulseContact<Dim>::gather_active(double h, StateOf<Dim>& state) {
 /// Returns the largest change of a place's velocity [m/s].
 template <int Dim>
 double ImpulseContact<Dim>::sweep(StateOf<Dim>& state) {
-  work_.pushes += static_cast<double>(active_.size());
+  pushes_ += static_cast<double>(active_.size());
   double change = 0;
   for (const Active& active : active_) {
     const ContactOf<Dim>& contact = set_.candidates()[static_cast<std::size_t>(active.candidate)];

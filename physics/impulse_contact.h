@@ -1,7 +1,6 @@
 #pragma once
 
 #include "physics/contact_set.h"
-#include "physics/step_work.h"
 
 namespace hydrostat::physics {
 
@@ -16,7 +15,7 @@ class ImpulseContact {
   bool is_needed() const { return !set_.is_empty(); }
   bool has_internal() const { return set_.has_internal(); }
   /// What contact alone has done.
-  const StepWork& work() const { return work_; }
+  ContactWork work() const;
   /// To be called when the state is not the one that the last substep left behind.
   void forget_reach() { reach_ = 0; }
   /// To be called when that state may have nothing to do with this one.
@@ -44,7 +43,7 @@ class ImpulseContact {
   double reach_ = 0;  // [m] that the body may still move before places beyond the candidates can touch
   std::vector<Active> active_;
   std::vector<char> is_candidate_;  // slots
-  StepWork work_;
+  double pushes_ = 0;
 };
 
 }  // namespace hydrostat::physics

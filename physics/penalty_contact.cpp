@@ -51,6 +51,12 @@ void PenaltyContact<Dim>::forget() {
 }
 
 template <int Dim>
+ContactWork PenaltyContact<Dim>::work() const {
+  ContactWork work = work_;
+  return work += set_.work();
+}
+
+template <int Dim>
 void PenaltyContact<Dim>::begin(const StateOf<Dim>& start, const PointsOf<Dim>& foreseen, double dt, double reach) {
   touches_.clear();
   travel_ = start.obstacle_travel;
@@ -63,8 +69,6 @@ void PenaltyContact<Dim>::begin(const StateOf<Dim>& start, const PointsOf<Dim>& 
     own_reach += kOwnReach * size_;
   }
   set_.find(start, reach, own_reach);
-  work_.searched += set_.searched();
-  work_.looks += static_cast<double>(set_.candidates().size());
   for (ContactOf<Dim>& contact : set_.candidates()) {
     const PointsOf<Dim>& x = contact.is_internal() ? start.x : foreseen;
     set_.update(x, travel_, contact);
@@ -223,6 +227,7 @@ void PenaltyContact<Dim>::book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim
 
 template <int Dim>
 void PenaltyContact<Dim>::stop_approach(const PointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass, PointsOf<Dim>& v) {
+  work_.looks += static_cast<double>(touches_.size());
   VectorOf<Dim> normal;
   for (Touch& touch : touches_) {
     touch.force.setZero();  // impulses from here on
@@ -260,6 +265,7 @@ void PenaltyContact<Dim>::stop_approach(const PointsOf<Dim>& x, const Eigen::Vec
 template <int Dim>
 void PenaltyContact<Dim>::end(const PointsOf<Dim>& x, PointsOf<Dim>& obstacle_travel) {
   std::fill(touching_.begin(), touching_.end(), 0);
+  work_.looks += static_cast<double>(touches_.size());
   VectorOf<Dim> normal;
   for (Touch& touch : touches_) {
     if (touch.stops && touch.contact.is_internal()) touch.contact.weights = touch.start_weights;

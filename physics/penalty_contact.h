@@ -1,7 +1,6 @@
 #pragma once
 
 #include "physics/contact_set.h"
-#include "physics/step_work.h"
 #include "physics/system_matrix.h"
 
 namespace hydrostat::physics {
@@ -19,7 +18,7 @@ class PenaltyContact {
   bool is_needed() const { return !set_.is_empty(); }
   bool has_internal() const { return set_.has_internal(); }
   /// What contact alone has done.
-  const StepWork& work() const { return work_; }
+  ContactWork work() const;
   /// To be called when the state is not the one that the last step left behind.
   void forget();
   /// Finds what may touch within `reach` [m] of the start and lays the anchors; `foreseen` is about where the step ends.
@@ -66,7 +65,7 @@ class PenaltyContact {
   PointsOf<Dim> stretch_;          // [m] Dim x slots, of the friction springs
   Eigen::VectorXd depth_at_rest_;  // [m] slots
   std::vector<char> touching_;     // slots: at the end of the last step
-  StepWork work_;
+  ContactWork work_;  // beside the set's
 };
 
 }  // namespace hydrostat::physics

@@ -91,7 +91,7 @@ class RecoveringStepper<Dim>::Recovery {
     return inside_out > kInsideOut * whole_volume_;
   }
 
-  const StepWork& contact_work() const { return contact_.work(); }
+  ContactWork contact_work() const { return contact_.work(); }
 
   bool is_over(const PointsOf<Dim>& x) const {
     if (since_s_ * frequency_ > kLongest * 2 * M_PI) return true;
@@ -237,7 +237,9 @@ void RecoveringStepper<Dim>::forget() {
 
 template <int Dim>
 StepWork RecoveringStepper<Dim>::work() const {
-  return method_->work() + recovery_->contact_work();
+  StepWork work = method_->work();
+  work.by_impulses += recovery_->contact_work();
+  return work;
 }
 
 template <int Dim>

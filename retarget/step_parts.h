@@ -24,10 +24,15 @@ template <int Dim>
 StepParts parts_of(const physics::SceneOf<Dim>& scene, bool is_active);
 
 /// [ns] of a method: of an outer step, a pass over the body (a sweep over its constraints) and an assembled matrix, of each their parts; of a
-/// product of two blocks; of a pair of place and surface looked through, a look at a place, a push of one (physics/step_work.h).
+/// product of two blocks.
 struct StepCosts {
   StepParts step, pass, assembly;
-  double product = 0, search = 0, look = 0, push = 0;
+  double product = 0;
+};
+
+/// [ns] of contact, as physics/step_work.h has it, by impulses and by a potential.
+struct ContactCosts {
+  double search = 0, own_search = 0, wide_look = 0, impulse_look = 0, impulse_push = 0, potential_look = 0, potential_push = 0;
 };
 
 }  // namespace hydrostat::retarget

@@ -1,6 +1,6 @@
 // How far counted work (retarget/step_cost.h) is from processor time: bars in the plane and in space, of springs, of triangles or
-// tets and of quads or hexahedra, soft and stiff, held in the air, held in water, lying on the ground and on a ball, with
-// activations and without, by every method in short and long steps. Usage: step_cost_bench [-o DIR] [-r ROUNDS] [-f FIT [-k SLOWER]]. Writes
+// tets and of quads or hexahedra, soft and stiff, held in the air, held in water, lying on the ground, on balls, on a block and in two
+// halves that bump into each other, with activations and without, by every method in short and long steps. Usage: step_cost_bench [-o DIR] [-r ROUNDS] [-f FIT [-k SLOWER]]. Writes
 // DIR/costs.csv (default DIR: out/costs), a line a run with what was counted and the least time of ROUNDS (4), and prints in
 // markdown for each method and kind of body the median of counted over measured, and within what nine of ten lie. FIT: a file for
 // the table of constants that these times ask for, of a machine that is SLOWER times as slow as this one (1).
@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <sstream>
 #include <string>
 #include <variant>
 #include <vector>
@@ -37,7 +38,8 @@ struct Surroundings {
   const char* name;
   bool is_active;  // activations change from step to step
 };
-constexpr std::array<Surroundings, 5> kSurroundings{{{"air", true}, {"air", false}, {"ground", true}, {"ball", true}, {"water", true}}};
+constexpr std::array<Surroundings, 7> kSurroundings{
+    {{"air", true}, {"air", false}, {"ground", true}, {"balls", true}, {"blocks", true}, {"halves", true}, {"water", true}}};
 
 struct Kind {
   const char *element, *law;
@@ -65,7 +67,15 @@ std::string scene_text(int dimension, const Kind& kind, int nodes, double youngs
                      "\ndamping_time_s = " + std::to_string(damping_time) + "\n";
   if (surroundings.is_active) text += "[[activation]]\namplitude = 0.1\nfrequency_hz = 2.0\n";
   const std::string name = surroundings.name;
-  if (name == "ground") return text + "[ground]\nheight_m = -0.13\n";
+  const auto place = [&](double x, double y) { return "[" + std::to_string(x) + ", " + std::to_string(y) + (is_flat ? "]\n" : ", 0.05]\n"); };
+  const auto obstacle = [&](const std::string& shape, const std::string& size, double x, double y) {
+    return "[[obstacle]]\nshape = \"" + shape + "\"\nsize_m = " + size + "\nposition_m = " + place(x, y);
+  };
+  const std::string on_ground = text + "[ground]\nheight_m = -0.13\n", cube = is_flat ? "[0.2, 0.2]" : "[0.2, 0.2, 0.2]";
+  if (name == "ground") return on_ground;
+  if (name == "balls") return on_ground + obstacle("ball", "0.3", 0.1, -0.28) + obstacle("ball", "0.3", -0.3, -0.28);
+  if (name == "blocks") return on_ground + obstacle("box", cube, 0.3, -0.225) + obstacle("box", cube, 3, 0);
+  if (name == "halves") return on_ground + "[[seam]]\nstrength_pa = 1.0\nnormal = " + (is_flat ? "[1.0, 0.0]\n" : "[1.0, 0.0, 0.0]\n");
   if (name == "water") text += "[water]\n";
   return text + "[[clamp]]\noffset_m = 0.49\nnormal = " + (is_flat ? "[-1.0, 0.0]\n" : "[-1.0, 0.0, 0.0]\n");
 }
@@ -115,10 +125,12 @@ void take(Run& run) {
 void write_csv(const std::vector<Run>& runs, const fs::path& file) {
   std::ofstream csv(file);
   csv << "kind,surroundings,active,youngs_modulus_pa,damping_s,method,dt_s,nodes,edges,springs,dashpots,volumes,elements,places,steps,passes,"
-         "sweeps,assemblies,products,rounds,searched,looks,pushes,plain,counted_ms,ms\n";
+         "sweeps,assemblies,products,rounds,searched,own_searched,looks,wide_looks,pushes,plain,counted_ms,ms\n";
   for (const Run& run : runs) {
     const auto write = [&](const auto& scenario) {
       const auto& body = scenario.scene.body;
+      physics::ContactWork contact = run.work.by_impulses;
+      contact += run.work.by_potential;
       long elements = 0;
       for (const auto& block : body.elements) elements += block.block.element_count();
       csv << '"' << run.kind << "\",";
@@ -127,8 +139,8 @@ void write_csv(const std::vector<Run>& runs, const fs::path& file) {
           << run.dt_s << ',' << body.node_count() << ',' << body.edge_count() << ',' << (body.edge_stiffness.array() > 0).count() << ','
           << (body.edge_damping.array() > 0).count() << ',' << body.volume_stiffness.size() << ',' << elements << ','
           << scenario.scene.contact_points.count() << ',' << run.steps << ',' << run.work.passes << ',' << run.work.sweeps << ',' << run.work.assemblies << ','
-          << run.work.products << ',' << run.work.rounds << ',' << run.work.searched << ',' << run.work.looks << ','
-          << run.work.pushes << ',' << run.is_plain << ',' << run.counted_ms << ',' << run.least_ms << '\n';
+          << run.work.products << ',' << run.work.rounds << ',' << contact.searched << ',' << contact.own_searched << ',' << contact.looks << ','
+          << contact.wide_looks << ',' << contact.pushes << ',' << run.is_plain << ',' << run.counted_ms << ',' << run.least_ms << '\n';
     };
     std::visit(write, run.scene.scenario);
   }
@@ -165,9 +177,9 @@ constexpr std::array<Part, 12> kParts{{{"one", &StepParts::one}, {"nodes", &Step
                                        {"simplices", &StepParts::simplices}, {"corotated", &StepParts::corotated}, {"boxes", &StepParts::boxes},
                                        {"active_simplices", &StepParts::active_simplices}, {"active_boxes", &StepParts::active_boxes},
                                        {"wet", &StepParts::wet}}};
-constexpr Eigen::Index kPartCount = kParts.size(), kCostCount = 3 * kPartCount + 4;
-/// Where each of them stands in a vector of costs: of steps, passes, assemblies, and what is no part.
-enum : Eigen::Index { kStep = 0, kPass = kPartCount, kAssembly = 2 * kPartCount, kRest = 3 * kPartCount };
+constexpr Eigen::Index kPartCount = kParts.size();
+/// Where each of them stands in a vector of a method's costs: of steps, passes and assemblies, and that of products.
+enum : Eigen::Index { kStep = 0, kPass = kPartCount, kAssembly = 2 * kPartCount, kProduct = 3 * kPartCount, kCostCount };
 
 /// How often a run paid each cost.
 Eigen::VectorXd counts_of(const Run& run) {
@@ -180,13 +192,26 @@ Eigen::VectorXd counts_of(const Run& run) {
     counts[kPass + p] = (run.work.passes + run.work.sweeps) * of_part;
     counts[kAssembly + p] = run.work.assemblies * of_part;
   }
-  counts.tail<4>() << run.work.products, run.work.searched, run.work.looks, run.work.pushes;
+  counts[kProduct] = run.work.products;
   return counts;
+}
+
+/// The same of retarget::ContactCosts, in its order.
+constexpr Eigen::Index kContactCount = 7;
+Eigen::Vector<double, kContactCount> contact_counts_of(const Run& run) {
+  const physics::ContactWork &impulses = run.work.by_impulses, &potential = run.work.by_potential;
+  return {impulses.searched + potential.searched,
+          impulses.own_searched + potential.own_searched,
+          impulses.wide_looks + potential.wide_looks,
+          impulses.looks,
+          impulses.pushes,
+          potential.looks,
+          potential.pushes};
 }
 
 /// Whether a method pays for a cost at all.
 bool is_paid(physics::Method method, Eigen::Index cost) {
-  if (cost >= kRest) return true;
+  if (cost == kProduct) return true;
   const double StepParts::*part = kParts[static_cast<std::size_t>(cost % kPartCount)].value;
   const bool is_active = part == &StepParts::active_simplices || part == &StepParts::active_boxes;
   const bool is_of_elements = is_active || part == &StepParts::volumes || part == &StepParts::simplices ||
@@ -196,53 +221,60 @@ bool is_paid(physics::Method method, Eigen::Index cost) {
   return cost < kPass || part != &StepParts::wet;
 }
 
-using Costs = std::map<physics::Method, Eigen::VectorXd>;
+struct Fit {
+  std::map<physics::Method, Eigen::VectorXd> costs;  // [ns]
+  Eigen::Vector<double, kContactCount> contact;      // [ns]
 
-/// Costs [ns] of methods, none below 0, that come nearest to the times of `runs`, by relative error. Those of `common` are one for all of
-/// these methods.
-Costs fitted(const std::vector<Run>& runs, std::size_t dimension, const std::vector<physics::Method>& methods,
-             const std::vector<Eigen::Index>& common) {
+  double ms(const Run& run) const { return 1e-6 * (costs.at(run.method).dot(counts_of(run)) + contact.dot(contact_counts_of(run))); }
+};
+
+/// Costs, none below 0, that come nearest to the times of `runs`, by relative error. Contact is one for all methods, a pass is one for `implicit`
+/// and `euler`; what `explicit` assembles is its guard, `euler`.
+Fit fitted(const std::vector<const Run*>& runs) {
   constexpr double kHold = 1e-3;  // of what a cost that stands alone would be worth [-]: of two that go together neither runs away
-  const auto column = [&](std::size_t m, Eigen::Index cost) {
-    const bool is_common = std::find(common.begin(), common.end(), cost) != common.end();
-    return static_cast<Eigen::Index>(is_common ? 0 : m) * kCostCount + cost;
+  const Eigen::Index contact = std::size(physics::kMethods) * kCostCount;
+  const auto column = [](physics::Method method, Eigen::Index cost) {
+    if (method == physics::Method::kEuler && cost >= kPass && cost < kAssembly) method = physics::Method::kImplicit;
+    if (method == physics::Method::kExplicit && cost >= kAssembly) method = physics::Method::kEuler;
+    return static_cast<Eigen::Index>(method) * kCostCount + cost;
   };
-  std::vector<Eigen::VectorXd> rows;
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    for (const Run& run : runs) {
-      if (!run.is_plain || run.method != methods[m] || run.scene.scenario.index() != dimension) continue;
-      const Eigen::VectorXd shares = 1e-6 / run.least_ms * counts_of(run);
-      rows.push_back(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(methods.size()) * kCostCount));
-      for (Eigen::Index c = 0; c < kCostCount; ++c) {
-        if (is_paid(run.method, c)) rows.back()[column(m, c)] = shares[c];
-      }
-          }
-  }
-  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(methods.size()) * kCostCount);
-  for (std::size_t r = 0; r < rows.size(); ++r) matrix.row(static_cast<Eigen::Index>(r)) = rows[r];
-  const Eigen::VectorXd lengths = matrix.colwise().norm().cwiseMax(1e-300).transpose();
-  matrix.array().rowwise() /= lengths.transpose().array();
-  const Eigen::VectorXd target = Eigen::VectorXd::Ones(matrix.rows());
-  const retarget::BoundedSolution solution =
-      retarget::solve(retarget::held_nonnegative(matrix, target, kHold), Eigen::VectorXd::Ones(matrix.cols()));
-  if (!solution.converged) std::fprintf(stderr, "step_cost_bench: the fit: did not settle (%g)\n", solution.kkt_residual);
-  Costs costs;
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    Eigen::VectorXd& own = costs[methods[m]] = Eigen::VectorXd::Zero(kCostCount);
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(runs.size()), contact + kContactCount);
+  for (Eigen::Index r = 0; r < rows.rows(); ++r) {
+    const Run& run = *runs[static_cast<std::size_t>(r)];
+    const Eigen::VectorXd counts = counts_of(run);
     for (Eigen::Index c = 0; c < kCostCount; ++c) {
-      if (is_paid(methods[m], c) && lengths[column(m, c)] > 1e-200) own[c] = solution.x[column(m, c)] / lengths[column(m, c)];
+      if (is_paid(run.method, c)) rows(r, column(run.method, c)) = counts[c];
+    }
+    rows.row(r).tail<kContactCount>() = contact_counts_of(run);
+    rows.row(r) *= 1e-6 / run.least_ms;
+  }
+  const Eigen::VectorXd lengths = rows.colwise().norm().cwiseMax(1e-300).transpose();
+  rows.array().rowwise() /= lengths.transpose().array();
+  const retarget::BoundedSolution solution =
+      retarget::solve(retarget::held_nonnegative(rows, Eigen::VectorXd::Ones(rows.rows()), kHold), Eigen::VectorXd::Ones(rows.cols()));
+  if (!solution.converged) std::fprintf(stderr, "step_cost_bench: the fit: did not settle (%g)\n", solution.kkt_residual);
+  Fit fit;
+  for (const physics::Method method : physics::kMethods) {
+    Eigen::VectorXd& own = fit.costs[method] = Eigen::VectorXd::Zero(kCostCount);
+    for (Eigen::Index c = 0; c < kCostCount; ++c) {
+      const Eigen::Index k = column(method, c);
+      if (is_paid(method, c) && lengths[k] > 1e-200) own[c] = solution.x[k] / lengths[k];
     }
   }
-  return costs;
+  fit.contact = (solution.x.array() / lengths.array()).tail<kContactCount>();
+  return fit;
+}
+
+/// With two digits.
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2g", value);
+  if (value >= 10) std::snprintf(text, sizeof text, "%.0f", std::stod(text));
+  return text;
 }
 
 /// As it is written in retarget/step_cost.cpp.
 void write_costs(const Eigen::VectorXd& costs, physics::Method method, std::ofstream& out) {
-  const auto number = [](double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, value < 1e4 ? "%.2g" : "%.0f", value);
-    return std::to_string(std::stod(text)).find(".000000") != std::string::npos ? std::to_string(std::lround(std::stod(text))) : std::string(text);
-  };
   out << "        {";
   for (const Eigen::Index block : {kStep, kPass, kAssembly}) {
     out << (block == kStep ? "{" : ",\n         {");
@@ -254,30 +286,28 @@ void write_costs(const Eigen::VectorXd& costs, physics::Method method, std::ofst
     }
     out << '}';
   }
-  for (Eigen::Index k = 0; k < 4; ++k) out << (k == 0 ? ",\n         " : ", ") << number(costs[kRest + k]);
-  out << "},  // " << physics::name_of(method) << '\n';
+  out << ", " << number(costs[kProduct]) << "},  // " << physics::name_of(method) << '\n';
 }
 
-/// Contact is one code for `explicit`, `xpbd` and `spring`, another for `implicit` and `euler`, whose passes are one too; what `explicit`
-/// assembles is its guard, `euler`.
 void write_fit(const std::vector<Run>& runs, double slower, const fs::path& file) {
-  using enum physics::Method;
   std::ofstream out(file);
+  std::ostringstream contact;
   std::vector<double> ratios;
   for (const std::size_t dimension : {0U, 1U}) {
-    std::vector<Eigen::Index> penalty{kRest + 1, kRest + 2, kRest + 3};
-    const std::vector<Eigen::Index> impulses = penalty;
-    for (Eigen::Index p = 0; p < kPartCount; ++p) penalty.push_back(kPass + p);
-    Costs costs = fitted(runs, dimension, {kImplicit, kEuler}, penalty);
-    for (const auto& [method, own] : fitted(runs, dimension, {kExplicit, kXpbd, kSpring}, impulses)) costs[method] = own;
-    costs[kExplicit].segment<kPartCount + 1>(kAssembly) = costs[kEuler].segment<kPartCount + 1>(kAssembly);
-    out << "    {\n";
-    for (const physics::Method method : physics::kMethods) write_costs(slower * costs[method], method, out);
-    out << "    },\n";
+    std::vector<const Run*> taken;
     for (const Run& run : runs) {
-      if (run.is_plain && run.scene.scenario.index() == dimension) ratios.push_back(1e-6 * costs[run.method].dot(counts_of(run)) / run.least_ms);
+      if (run.is_plain && run.scene.scenario.index() == dimension) taken.push_back(&run);
     }
+    const Fit fit = fitted(taken);
+    for (const Run* run : taken) ratios.push_back(fit.ms(*run) / run->least_ms);
+    out << "    {\n";
+    for (const auto& [method, costs] : fit.costs) write_costs(slower * costs, method, out);
+    out << "    },\n";
+    contact << "    {";
+    for (Eigen::Index k = 0; k < kContactCount; ++k) contact << (k == 0 ? "" : ", ") << number(slower * fit.contact[k]);
+    contact << "},\n";
   }
+  out << contact.str();
   std::printf("The fit over measured: half within %.2f and %.2f, nine of ten within %.2f and %.2f.\n", quantile(ratios, 0.25), quantile(ratios, 0.75),
               quantile(ratios, 0.05), quantile(ratios, 0.95));
 }

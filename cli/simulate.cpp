@@ -205,7 +205,9 @@ int simulate(const SimulateCommand& command) {
   io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
   if (!command.trace.empty()) {
     io::refuse_trace(command.trace);
-    const auto whole = [](const std::string& path) { return (std::filesystem::weakly_canonical(path) / "").lexically_normal(); };
+    const auto whole = [](const std::string& path) {
+      return (std::filesystem::weakly_canonical(std::filesystem::absolute(path)) / "").lexically_normal();
+    };
     if (whole(command.trace) == whole(command.out)) {
       throw UsageError(kCommand, "option --trace", "'" + command.trace + "' is where the outcome goes", "Name another folder, which may lie in it.");
     }

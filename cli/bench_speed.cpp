@@ -45,7 +45,7 @@ struct SpeedCommand {
 struct SpeedRow {
   int nodes = 0, constraints = 0, frames = 0;
   double body_ms = 0, coupling_ms = 0, preparation_ms = 0, inverse_ms = 0, signals_ms = 0;
-  double simulation_ms = 0, counted_ms = 0, correction_ms = 0;  // for a simulated second
+  double simulation_ms = 0, counted_ms = 0, correction_ms = 0, counted_correction_ms = 0;  // for a simulated second
 
   double real_time() const { return 1000 / (simulation_ms + correction_ms); }
 };
@@ -69,6 +69,7 @@ constexpr Column kColumns[] = {
     {"simulation_ms_per_s", "simulation [ms a second]", [](const SpeedRow& row) { return row.simulation_ms; }},
     {"counted_ms_per_s", "the same, counted", [](const SpeedRow& row) { return row.counted_ms; }},
     {"correction_ms_per_s", "correction [ms a second]", [](const SpeedRow& row) { return row.correction_ms; }},
+    {"counted_correction_ms_per_s", "the same, counted", [](const SpeedRow& row) { return row.counted_correction_ms; }},
     {"real_time", "times real time", [](const SpeedRow& row) { return row.real_time(); }}};
 
 double process_ms() {
@@ -127,6 +128,8 @@ void measure_replay(const retarget::Performer& performer, const retarget::Signal
   const retarget::Replay& run = performances.main();
   const double replayed_s = std::max(1, static_cast<int>(run.motion.count()) - 1) / run.motion.rate_hz;
   row.correction_ms = std::max(0.0, replay_ms / replayed_s - row.simulation_ms);
+  row.counted_correction_ms = retarget::counted_ms_of_correction(performer.scene, performer.muscles.fields.cols()) /
+                              (perform.replay.step_s * perform.replay.steps_per_control);
 }
 
 SpeedRow measure(const SpeedCommand& command, const retarget::Character& character, int wished) {

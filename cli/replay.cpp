@@ -18,6 +18,7 @@
 #include "io/gltf_out.h"
 #include "io/load_creature.h"
 #include "io/trace_writer.h"
+#include "io/writable.h"
 #include "retarget/error.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
@@ -278,6 +279,8 @@ int replay(const ReplayCommand& command) {
   retarget::PerformOptions options = perform_options(command, creature);
   const WobbleChoice wobble(command.wobble, command.level.is_asked(), command.directory, creature);
   check_scene(command, creature);
+  if (!command.out.empty()) io::refuse_unwritable_file(command.out);
+  if (!command.trace.empty()) io::refuse_trace(command.trace);
   Levels levels(command, creature, options, stages);
   wobble.plan(creature.target.performer);
   std::optional<ChosenStep> chosen;
@@ -313,10 +316,13 @@ int replay(const ReplayCommand& command) {
   std::vector<std::string>& warnings = creature.target.report.warnings;
   for (const std::string& warning : retarget::feedback_warnings(performances)) warnings.push_back(warning);
   if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
-  if (!command.trace.empty()) write_trace(command, performer.world, performances.main().trace, every);
   const bool is_met = !chosen || chosen->report.is_met();
   if (!command.json) tell_level(creature.target.report, command.directory);
+  const auto keep_trace = [&] {
+    if (!command.trace.empty()) write_trace(command, performer.world, performances.main().trace, every);
+  };
   if (!writer) {
+    keep_trace();
     const int exit_code = write_motion(command, performer, creature.appearance, performances, way_up);
     if (chosen) tell_accuracy(*chosen, performer);
     if (is_met || exit_code != kDone) return exit_code;
@@ -341,6 +347,7 @@ int replay(const ReplayCommand& command) {
     throw writer->as_seen(error);
   }
   writer->commit();
+  keep_trace();  // which may lie in the creature
   const retarget::Replay& run = performances.main();
   const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();
   const int exit_code = command.json ? tell_report(run, command.directory, motion_file, report, way_up)

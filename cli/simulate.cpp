@@ -203,6 +203,15 @@ int simulate(const SimulateCommand& command) {
   Progress progress(std::cerr, progress_style(command.quiet));
   Stages stages(progress);
   io::SceneFile scene = stages.run("scene", [&] { return read_scene(command); });
+  if (!command.trace.empty()) {
+    io::refuse_trace(command.trace);
+    const auto whole = [](const std::string& path) {
+      return (std::filesystem::weakly_canonical(std::filesystem::absolute(path)) / "").lexically_normal();
+    };
+    if (whole(command.trace) == whole(command.out)) {
+      throw UsageError(kCommand, "option --trace", "'" + command.trace + "' is where the outcome goes", "Name another folder, which may lie in it.");
+    }
+  }
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
   retarget::RunReport report;
   std::optional<ChosenStep> chosen;
@@ -250,8 +259,8 @@ int simulate(const SimulateCommand& command) {
   } catch (const Error& error) {
     throw writer.as_seen(error);
   }
-  if (!command.trace.empty()) io::write_trace(command.trace, simulation.trace);
   writer.commit();
+  if (!command.trace.empty()) io::write_trace(command.trace, simulation.trace);  // which may lie in the outcome
   return tell(command, report);
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "io/npy.h"
+#include "io/writable.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -47,12 +48,20 @@ void refuse_other_things(const fs::path& folder) {
   }
 }
 
+/// A name that ends in a slash has an empty last part, beside which nothing can be named.
+fs::path place_of(const fs::path& folder) { return folder.has_filename() ? folder : folder.parent_path(); }
+
 }  // namespace
+
+void refuse_trace(const fs::path& folder) {
+  const fs::path place = place_of(folder);
+  refuse_other_things(place);
+  refuse_unwritable(place.parent_path());
+}
 
 void write_trace(const fs::path& folder, const retarget::Trace& trace) {
   assert(trace.position.cols() == trace.count() && trace.position.rows() == 3 * trace.mass_kg.size());
-  // A name that ends in a slash has an empty last part, beside which nothing can be named.
-  const fs::path place = folder.has_filename() ? folder : folder.parent_path();
+  const fs::path place = place_of(folder);
   const fs::path part = place.string() + ".part";
   try {
     refuse_other_things(place);

@@ -13,4 +13,7 @@ namespace hydrostat::io {
 /// time.npy) stands there.
 void write_trace(const std::filesystem::path& folder, const retarget::Trace& trace);
 
+/// Throws what write_trace would, before there is anything to write; leaves nothing behind.
+void refuse_trace(const std::filesystem::path& folder);
+
 }  // namespace hydrostat::io

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <vector>
 
 #include "io/writable.h"
 #include "io/write_error.h"
@@ -85,13 +86,25 @@ void write_file(const std::filesystem::path& file, std::string_view bytes) { wri
 
 void refuse_unwritable(const std::filesystem::path& directory) {
   std::error_code failed;
+  std::vector<std::filesystem::path> made;  // the deepest first
+  for (std::filesystem::path place = directory; !place.empty(); place = place.parent_path()) {
+    if (std::filesystem::exists(std::filesystem::symlink_status(place, failed))) break;
+    made.push_back(place);
+  }
   if (!directory.empty()) std::filesystem::create_directories(directory, failed);
-  if (failed) throw write_error(directory, failed.value());
+  const int cannot_make = failed.value();
   std::string name = (directory / ".hydrostat-XXXXXX").string();
-  const int descriptor = mkstemp(name.data());
-  if (descriptor < 0) throw write_error(directory, errno);
-  close(descriptor);
-  std::filesystem::remove(name, failed);
+  const int descriptor = cannot_make != 0 ? -1 : mkstemp(name.data());
+  const int cannot_write = cannot_make != 0 ? cannot_make : descriptor < 0 ? errno : 0;
+  if (descriptor >= 0) close(descriptor);
+  if (descriptor >= 0) std::filesystem::remove(name, failed);
+  for (const std::filesystem::path& place : made) std::filesystem::remove(place, failed);  // those that are empty
+  if (cannot_write != 0) throw write_error(directory, cannot_write);
+}
+
+void refuse_unwritable_file(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file)) throw write_error(file, EISDIR);
+  refuse_unwritable(file.parent_path());
 }
 
 std::string read_file(const std::filesystem::path& file) {

@@ -171,8 +171,15 @@ bool ContactSet<Dim>::is_near(const StateOf<Dim>& state, int surface, const Feat
 }
 
 template <int Dim>
+ContactWork ContactSet<Dim>::work() const {
+  ContactWork work = work_;
+  return work += itself_.work();
+}
+
+template <int Dim>
 void ContactSet<Dim>::find(const StateOf<Dim>& state, double reach, double own_reach) {
   candidates_.clear();
+  work_.searched += slot_count_;
   if (starts_unknown_) {
     way_out_.choose(state);
   } else {
@@ -199,7 +206,8 @@ void ContactSet<Dim>::find(const StateOf<Dim>& state, double reach, double own_r
 }
 
 template <int Dim>
-void ContactSet<Dim>::update(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, ContactOf<Dim>& contact) const {
+void ContactSet<Dim>::update(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, ContactOf<Dim>& contact) {
+  ++(contact.is_internal() || contact.point_count > 1 ? work_.wide_looks : work_.looks);
   if (contact.is_internal()) {
     itself_.update(x, contact);
   } else if (contact.point_count == 1) {

@@ -39,6 +39,8 @@ class ContactSet {
   bool is_empty() const { return slot_count() == 0; }
   bool has_internal() const { return !itself_.is_empty(); }
   int slot_count() const { return slot_count_ + itself_.slot_count(); }
+  /// Of finding and updating; what is near is pushed elsewhere.
+  ContactWork work() const;
   /// Chooses as candidates all that may come to touch while no place moves more than `reach` [m], against the body itself while
   /// none moves more than `own_reach`.
   void find(const StateOf<Dim>& state, double reach, double own_reach);
@@ -51,7 +53,7 @@ class ContactSet {
   std::vector<ContactOf<Dim>>& candidates() { return candidates_; }
   const std::vector<ContactOf<Dim>>& candidates() const { return candidates_; }
   /// Brings gap and normal of a candidate, and the place of one between the contact points, to `x`.
-  void update(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, ContactOf<Dim>& contact) const;
+  void update(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, ContactOf<Dim>& contact);
   /// The gap of a contact whose place on the body stays: `normal` becomes the gradient.
   double gap(const PointsOf<Dim>& x, const PointsOf<Dim>& travel, const ContactOf<Dim>& contact,
              VectorOf<Dim>& normal) const;
@@ -93,6 +95,7 @@ class ContactSet {
   SelfContactSet<Dim> itself_;
   WayOut<Dim> way_out_;
   bool starts_unknown_ = true;
+  ContactWork work_;
 };
 
 }  // namespace hydrostat::physics

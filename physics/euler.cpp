@@ -54,7 +54,11 @@ class EulerStepper final : public StepperOf<Dim> {
   /// Steps that ended above the minimum.
   long guard_steps() const override { return unsolved_; }
 
-  StepWork work() const override { return work_; }
+  StepWork work() const override {
+    StepWork work = work_;
+    work.by_potential = contact_.work();
+    return work;
+  }
 
   void forget() override { contact_.forget(); }
 
@@ -125,7 +129,7 @@ class EulerStepper final : public StepperOf<Dim> {
   }
 
   /// What the step minimises [J].
-  double potential(const PointsOf<Dim>& x, double dt) const {
+  double potential(const PointsOf<Dim>& x, double dt) {
     const BodyOf<Dim>& body = scene_.body;
     double sum = forces_.elastic_energy(x);
     for (int i = 0; i < body.node_count(); ++i) {

@@ -71,7 +71,11 @@ class ExplicitStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / (kStepMargin * longest_substep(mode_at_rest_))); }
 
-  StepWork work() const override { return work_; }
+  StepWork work() const override {
+    StepWork work = work_;
+    work.by_impulses = contact_.work();
+    return work;
+  }
 
   void forget() override { contact_.forget(); }
 

@@ -75,7 +75,11 @@ class ImplicitStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / longest_substep_); }
 
-  StepWork work() const override { return work_; }
+  StepWork work() const override {
+    StepWork work = work_;
+    work.by_potential = contact_.work();
+    return work;
+  }
 
   void forget() override { contact_.forget(); }
 

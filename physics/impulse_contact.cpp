@@ -22,6 +22,13 @@ ImpulseContact<Dim>::ImpulseContact(const SceneOf<Dim>& scene)
 }
 
 template <int Dim>
+ContactWork ImpulseContact<Dim>::work() const {
+  ContactWork work = set_.work();
+  work.pushes += pushes_;
+  return work;
+}
+
+template <int Dim>
 void ImpulseContact<Dim>::find_candidates(double farther, const StateOf<Dim>& state) {
   reach_ = kReach * shortest_edge_;
   const bool had_none = set_.candidates().empty();
@@ -64,6 +71,7 @@ void ImpulseContact<Dim>::gather_active(double h, StateOf<Dim>& state) {
 /// Returns the largest change of a place's velocity [m/s].
 template <int Dim>
 double ImpulseContact<Dim>::sweep(StateOf<Dim>& state) {
+  pushes_ += static_cast<double>(active_.size());
   double change = 0;
   for (const Active& active : active_) {
     const ContactOf<Dim>& contact = set_.candidates()[static_cast<std::size_t>(active.candidate)];

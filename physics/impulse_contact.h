@@ -14,6 +14,8 @@ class ImpulseContact {
 
   bool is_needed() const { return !set_.is_empty(); }
   bool has_internal() const { return set_.has_internal(); }
+  /// What contact alone has done.
+  ContactWork work() const;
   /// To be called when the state is not the one that the last substep left behind.
   void forget_reach() { reach_ = 0; }
   /// To be called when that state may have nothing to do with this one.
@@ -41,6 +43,7 @@ class ImpulseContact {
   double reach_ = 0;  // [m] that the body may still move before places beyond the candidates can touch
   std::vector<Active> active_;
   std::vector<char> is_candidate_;  // slots
+  double pushes_ = 0;
 };
 
 }  // namespace hydrostat::physics

@@ -51,6 +51,12 @@ void PenaltyContact<Dim>::forget() {
 }
 
 template <int Dim>
+ContactWork PenaltyContact<Dim>::work() const {
+  ContactWork work = work_;
+  return work += set_.work();
+}
+
+template <int Dim>
 void PenaltyContact<Dim>::begin(const StateOf<Dim>& start, const PointsOf<Dim>& foreseen, double dt, double reach) {
   touches_.clear();
   travel_ = start.obstacle_travel;
@@ -114,6 +120,7 @@ VectorOf<Dim> PenaltyContact<Dim>::slip(const Touch& touch, const PointsOf<Dim>&
 
 template <int Dim>
 void PenaltyContact<Dim>::update_friction(const PointsOf<Dim>& x) {
+  work_.looks += static_cast<double>(touches_.size());
   for (Touch& touch : touches_) {
     touch.last_limit = touch.limit;
     touch.limit = set_.friction(touch.contact) * touch.stiffness * std::max(0.0, depth(touch, x, touch.friction_normal));
@@ -126,11 +133,13 @@ void PenaltyContact<Dim>::shorten_friction_update(double part) {
 }
 
 template <int Dim>
-double PenaltyContact<Dim>::potential(const PointsOf<Dim>& x) const {
+double PenaltyContact<Dim>::potential(const PointsOf<Dim>& x) {
+  work_.looks += static_cast<double>(touches_.size());
   double sum = 0;
   VectorOf<Dim> normal;
   for (const Touch& touch : touches_) {
     const double deep = std::max(0.0, depth(touch, x, normal));
+    if (deep > 0 || touch.limit > 0) ++work_.pushes;
     sum += 0.5 * touch.stiffness * deep * deep;
     if (touch.limit == 0) continue;
     const double distance = slip(touch, x).norm(), pull = touch.stiffness * distance;
@@ -141,10 +150,12 @@ double PenaltyContact<Dim>::potential(const PointsOf<Dim>& x) const {
 
 template <int Dim>
 void PenaltyContact<Dim>::add_forces(const PointsOf<Dim>& x, PointsOf<Dim>& force) {
+  work_.looks += static_cast<double>(touches_.size());
   VectorOf<Dim> normal;
   for (Touch& touch : touches_) {
     touch.force.setZero();
     const double deep = depth(touch, x, normal);
+    if (deep > 0 || touch.limit > 0) ++work_.pushes;
     if (deep > 0) touch.force = touch.stiffness * deep * normal;
     if (touch.limit > 0) {
       const VectorOf<Dim> from_anchor = slip(touch, x);
@@ -159,7 +170,8 @@ void PenaltyContact<Dim>::add_forces(const PointsOf<Dim>& x, PointsOf<Dim>& forc
 }
 
 template <int Dim>
-void PenaltyContact<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) const {
+void PenaltyContact<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) {
+  work_.looks += static_cast<double>(touches_.size());
   VectorOf<Dim> normal;
   for (const Touch& touch : touches_) {
     BlockOf<Dim> block = BlockOf<Dim>::Zero();
@@ -177,6 +189,7 @@ void PenaltyContact<Dim>::add_stiffness(const PointsOf<Dim>& x, double factor, S
       block += tangential;
     }
     const ContactOf<Dim>& contact = touch.contact;
+    if (!block.isZero(0)) ++work_.pushes;
     if (!contact.is_internal()) {
       matrix.add_contact(contact.node_count, contact.nodes.data(), contact.weights.data(), factor * block);
     } else if (!block.isZero(0)) {
@@ -214,6 +227,7 @@ void PenaltyContact<Dim>::book(double dt, const PointsOf<Dim>& x, ImpulsesOf<Dim
 
 template <int Dim>
 void PenaltyContact<Dim>::stop_approach(const PointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass, PointsOf<Dim>& v) {
+  work_.looks += static_cast<double>(touches_.size());
   VectorOf<Dim> normal;
   for (Touch& touch : touches_) {
     touch.force.setZero();  // impulses from here on
@@ -232,6 +246,7 @@ void PenaltyContact<Dim>::stop_approach(const PointsOf<Dim>& x, const Eigen::Vec
     double change = 0;
     for (Touch& touch : touches_) {
       if (!touch.stops) continue;
+      ++work_.pushes;
       const ContactOf<Dim>& contact = touch.contact;
       const VectorOf<Dim> velocity = contact.of(v) - set_.velocity(contact);
       const VectorOf<Dim> wanted = impulse_in_cone<Dim>(contact, velocity, 0, set_.friction(contact), touch.force);
@@ -250,6 +265,7 @@ void PenaltyContact<Dim>::stop_approach(const PointsOf<Dim>& x, const Eigen::Vec
 template <int Dim>
 void PenaltyContact<Dim>::end(const PointsOf<Dim>& x, PointsOf<Dim>& obstacle_travel) {
   std::fill(touching_.begin(), touching_.end(), 0);
+  work_.looks += static_cast<double>(touches_.size());
   VectorOf<Dim> normal;
   for (Touch& touch : touches_) {
     if (touch.stops && touch.contact.is_internal()) touch.contact.weights = touch.start_weights;

@@ -17,6 +17,8 @@ class PenaltyContact {
 
   bool is_needed() const { return !set_.is_empty(); }
   bool has_internal() const { return set_.has_internal(); }
+  /// What contact alone has done.
+  ContactWork work() const;
   /// To be called when the state is not the one that the last step left behind.
   void forget();
   /// Finds what may touch within `reach` [m] of the start and lays the anchors; `foreseen` is about where the step ends.
@@ -25,9 +27,9 @@ class PenaltyContact {
   void update_friction(const PointsOf<Dim>& x);
   /// Leaves only `part` [-] of the last update of the limits.
   void shorten_friction_update(double part);
-  double potential(const PointsOf<Dim>& x) const;                 // [J]
+  double potential(const PointsOf<Dim>& x);                       // [J]
   void add_forces(const PointsOf<Dim>& x, PointsOf<Dim>& force);  // [N]; keeps them for book
-  void add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix) const;
+  void add_stiffness(const PointsOf<Dim>& x, double factor, SystemMatrixOf<Dim>& matrix);
   /// Takes from the velocities of touching places what approaches and, inside Coulomb's cone, slides: what book then books
   /// with a dt of 1 are the impulses of that.
   void stop_approach(const PointsOf<Dim>& x, const Eigen::VectorXd& inverse_mass, PointsOf<Dim>& v);
@@ -63,6 +65,7 @@ class PenaltyContact {
   PointsOf<Dim> stretch_;          // [m] Dim x slots, of the friction springs
   Eigen::VectorXd depth_at_rest_;  // [m] slots
   std::vector<char> touching_;     // slots: at the end of the last step
+  ContactWork work_;  // beside the set's
 };
 
 }  // namespace hydrostat::physics

@@ -91,6 +91,8 @@ class RecoveringStepper<Dim>::Recovery {
     return inside_out > kInsideOut * whole_volume_;
   }
 
+  ContactWork contact_work() const { return contact_.work(); }
+
   bool is_over(const PointsOf<Dim>& x) const {
     if (since_s_ * frequency_ > kLongest * 2 * M_PI) return true;
     for (int t = 0; t < scene_.body.tet_count(); ++t) {
@@ -231,6 +233,13 @@ template <int Dim>
 void RecoveringStepper<Dim>::forget() {
   is_recovering_ = false;
   method_->forget();
+}
+
+template <int Dim>
+StepWork RecoveringStepper<Dim>::work() const {
+  StepWork work = method_->work();
+  work.by_impulses += recovery_->contact_work();
+  return work;
 }
 
 template <int Dim>

@@ -25,7 +25,7 @@ class RecoveringStepper final : public StepperOf<Dim> {
   double substep(double dt) const override { return method_->substep(dt); }
   void forget() override;
   long guard_steps() const override { return method_->guard_steps() + steps_; }
-  StepWork work() const override { return method_->work(); }
+  StepWork work() const override;
 
   /// Whether the next step, too, is one back to the rest shape.
   bool is_recovering() const { return is_recovering_; }

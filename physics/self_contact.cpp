@@ -141,6 +141,7 @@ void SelfContactSet<Dim>::gather(const PointsOf<Dim>& x, double reach) {
   if (stood_apart) measure_apart(x);
   if (stood_apart && apart_ > 2 * reach) return;  // the partners are none as before
   partners_.clear();
+  work_.own_searched += slot_count_;
   for (int place = 0; place < slot_count_; ++place) {
     const auto p = static_cast<std::size_t>(place);
     partner_begin_[p] = static_cast<int>(partners_.size());
@@ -157,6 +158,7 @@ void SelfContactSet<Dim>::gather(const PointsOf<Dim>& x, double reach) {
 template <int Dim>
 void SelfContactSet<Dim>::measure_apart(const PointsOf<Dim>& x) {
   apart_ = farthest_apart_;
+  work_.own_searched += slot_count_;
   for (int place = 0; place < slot_count_; ++place) {
     visit_partners(x, place, apart_, [&](int, double gap) { apart_ = std::min(apart_, gap); });
   }
@@ -188,6 +190,7 @@ void SelfContactSet<Dim>::find(const PointsOf<Dim>& x, double reach, int first_s
     contact.slot = first_slot + place;
     contact.feature = place;
     update(x, contact);
+    ++work_.wide_looks;
     if (may_overlap || (is_point && contact.gap < 0)) {
       find_overlap(x, place);
       update(x, contact);

@@ -4,6 +4,7 @@
 
 #include "physics/box_tree.h"
 #include "physics/scene.h"
+#include "physics/step_work.h"
 
 namespace hydrostat::physics {
 
@@ -41,6 +42,7 @@ class SelfContactSet {
   double deepest(const PointsOf<Dim>& x);
   /// How often the whole surface was looked through so far.
   long searches() const { return searches_; }
+  const ContactWork& work() const { return work_; }
 
  private:
   struct Edge {
@@ -90,6 +92,7 @@ class SelfContactSet {
   double apart_ = 0;
   double farthest_apart_ = 0;  // [m] as far as that is of interest
   long searches_ = 0;
+  ContactWork work_;
   bool starts_unknown_ = true, tets_follow_ = false, overlaps_itself_ = false;
 };
 

@@ -5,23 +5,11 @@
 #include <string>
 
 #include "physics/scene.h"
+#include "physics/step_work.h"
 
 namespace hydrostat::physics {
 
 enum class Termination { kDone, kDiverged };
-
-/// What a stepper has done so far, counted: the same input gives the same counts on every machine. What each costs is told by
-/// retarget/step_cost.h.
-struct StepWork {
-  double passes = 0;      // over the whole body, for its forces or its energy
-  double sweeps = 0;      // over all of xpbd's constraints
-  double assemblies = 0;  // of the system matrix
-  double products = 0;    // of its blocks (Dim x Dim), to factor it and to solve with it
-  double rounds = 0;      // of what iterates: substeps, Newton's steps, those of L-BFGS
-};
-inline StepWork operator+(const StepWork& a, const StepWork& b) {
-  return {a.passes + b.passes, a.sweeps + b.sweeps, a.assemblies + b.assemblies, a.products + b.products, a.rounds + b.rounds};
-}
 
 /// One method of time integration bound to one scene; it keeps scratch memory, steps allocate nothing.
 template <int Dim>

@@ -43,7 +43,11 @@ class XpbdStepper final : public StepperOf<Dim> {
 
   double substep(double dt) const override { return dt / std::ceil(dt / substep_); }
 
-  StepWork work() const override { return work_; }
+  StepWork work() const override {
+    StepWork work = work_;
+    work.by_impulses = contact_.work();
+    return work;
+  }
 
   void forget() override { contact_.forget(); }
 

@@ -121,12 +121,12 @@ SelfContactPlan plan_self_contact(const ScenarioOf<Dim>& scenario, StartShape st
     if (energies > kMuchEnergy && std::isfinite(energies))
       return plan(false, sentence("to fold this bar takes %.0f times the energy that fall, speed and pushes can give it", energies));
     if (energies > kMuchEnergy) return plan(false, "nothing gives this bar energy to fold");
-    return plan(true, sentence("the body is %.1f times as long as wide and may come round to itself", slenderness));
+    return plan(true, sentence("the longest way through the body is %.1f times its mean width: it may come round to itself", slenderness));
   }
   if (has_near_parts(scene, body.rest_length.mean())) {
     return plan(true, "parts that are far from each other along the body stand within two cells");
   }
-  return plan(false, sentence("the body is %.1f times as long as wide: a ring of it would be strained by %.0f %%",
+  return plan(false, sentence("the longest way through the body is %.1f times its mean width: a ring of it would be strained by %.0f %%",
                               slenderness, 100 * kRing / slenderness));
 }
 

@@ -5,8 +5,8 @@
 namespace hydrostat::retarget {
 
 /// What so many outer steps and the work in them are worth on a scene's body [ms]: counts times a table of constants
-/// (step_cost.cpp), so that a choice by it hangs on the scene alone, never on the clock. Water, air, ground and obstacles
-/// count by the places of the body's surface, wherever these are; how much really touches does not, nor does a body that touches itself.
+/// (step_cost.cpp), so that a choice by it hangs on the scene alone, never on the clock. Water and air count by the places of the
+/// body's surface, wherever these are; contact as often as places were looked at and pushed.
 /// `is_active`: activations change, of which finite elements ask more.
 template <int Dim>
 double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, bool is_active, double steps,

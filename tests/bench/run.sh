@@ -4,8 +4,9 @@
 # our methods and Bullet's deformable body on the same meshes; exit code 1 if a goal is missed. All three sizes take a quarter of an hour.
 #   tests/bench/run.sh damping [-o DIR]
 # explicit and implicit over damping and stiffness.
-#   tests/bench/run.sh costs [-o DIR] [-r ROUNDS]
-# counted work (retarget/step_cost.h) against processor time, every method on bodies of all kinds: a quarter of an hour.
+#   tests/bench/run.sh costs [-o DIR] [-r ROUNDS] [-f FIT [-k SLOWER]]
+# counted work (retarget/step_cost.h) against processor time, every method on bodies of all kinds: half an hour. FIT: a file for
+# the table of constants that these times ask for, of a machine that is SLOWER times as slow as this one (1).
 # Installs what is missing, builds, prints a table in markdown and writes it to DIR (default: out/peers/peers.csv,
 # out/damping/damping.csv, out/costs/costs.csv).
 set -euo pipefail

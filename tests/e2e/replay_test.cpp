@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "tests/e2e/made_creature.h"
 #include "tests/e2e/trace_audit.h"
 
@@ -130,6 +132,26 @@ TEST_F(Replay, WobblesInThePictureAlone) {
   EXPECT_EQ(motion("without_rig", "--wobble off"), off);
   EXPECT_EQ(replay("--wobble on -o motion.glb").exit_code, 1);
   EXPECT_EQ(replay("--wobble perhaps").exit_code, 2);
+}
+
+TEST_F(Replay, RefusesWhatCannotBeWrittenBeforeItMeasuresAnything) {
+  io::write_file(directory_.path / "file", "");
+  fs::create_directory(directory_.path / "motion.glb");
+  const std::map<std::string, std::string> faults{{"-o file/motion.glb", "cannot be written: Not a directory"},
+                                                  {"-o motion.glb", "cannot be written: Is a directory"},
+                                                  {"--trace file/trace", "cannot be written: Not a directory"},
+                                                  {"--trace creature", "the folder holds something that is not a trace"}};
+  for (const auto& [output, fault] : faults) {
+    const Outcome outcome = replay(output + " --lod auto --budget 1e-6ms");  // which no level meets, as measuring would tell
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.err.find(fault), std::string::npos) << outcome.err;
+  }
+}
+
+TEST_F(Replay, MayLeaveItsTraceInTheCreature) {
+  const Outcome outcome = replay("--duration 0.3 --trace creature/trace");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(fs::exists(creature_ / "trace" / "time.npy"));
 }
 
 TEST_F(Replay, WithAFileOfItsOwnLeavesTheCreatureAlone) {

@@ -178,7 +178,16 @@ TEST(Simulate, RefusesOnOneLineAndLeavesNothing) {
   EXPECT_EQ(rate.exit_code, 2);
   EXPECT_NE(rate.err.find("option --trace-rate: 7 Hz is not a whole part of the 240 Hz"), std::string::npos) << rate.err;
   EXPECT_EQ(simulate(directory.path, scene_of("bouncing_circle"), "--method magic").exit_code, 2);
+  const Outcome same = simulate(directory.path, scene_of("bouncing_circle"), "--trace ./out/");
+  EXPECT_EQ(same.exit_code, 2);
+  EXPECT_NE(same.err.find("'./out/' is where the outcome goes"), std::string::npos) << same.err;
   EXPECT_EQ(names_in(directory.path), std::set<std::string>{"bad.toml"});
+}
+
+TEST(Simulate, MayLeaveItsTraceInItsOutcome) {
+  const TemporaryDirectory directory;
+  ASSERT_EQ(simulate(directory.path, scene_of("block_on_slope"), "--duration 0.1 --trace out/trace").exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(directory.path / "out" / "trace" / "time.npy"));
 }
 
 TEST(Simulate, WritesNoCreatureThatCouldBeReplayed) {

@@ -423,7 +423,7 @@ TEST_F(SceneFiles, TouchThemselvesWhereTheyMayComeToMeet) {
   const std::string jaws = "dimension = 2\n[body]\nshape = \"outline\"\nnodes = 200\n"
                            "outline_m = [[0, 0], [2, 0], [2, 0.9], [0.5, 0.9], [0.5, 1.1], [2, 1.1], [2, 2], [0, 2]]\n";
   for (const Scene& scene :
-       {Scene{bar, false, "nothing bends"}, Scene{bar + ground, true, "times as long as wide"}, Scene{square + ground, false, "a ring of it"},
+       {Scene{bar, false, "nothing bends"}, Scene{bar + ground, true, "times its mean width: it may"}, Scene{square + ground, false, "a ring of it"},
         Scene{jaws + ground, true, "stand within two cells"}, Scene{bar + "start = \"random\"\n" + ground, false, "out of shape"},
         Scene{square + ground + "[effects]\nself_contact = \"on\"\n", true, "asked for"},
         Scene{bar + ground + "[effects]\nself_contact = \"off\"\n", false, "turned off"}}) {

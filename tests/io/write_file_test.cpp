@@ -73,13 +73,22 @@ TEST(WriteFile, RefusesADirectoryWhereTheFileBelongs) {
   EXPECT_EQ(directory.count(), 1U);
 }
 
-TEST(RefuseUnwritable, MakesTheDirectoryLeavesNothingInItAndRefusesLikeTheFilesThatWouldCome) {
+TEST(RefuseUnwritable, LeavesNothingAndRefusesLikeTheFilesThatWouldCome) {
   const TemporaryDirectory directory;
-  for (int times = 0; times < 2; ++times) {  // missing, and there
-    refuse_unwritable(directory.path / "a" / "b");
-    EXPECT_TRUE(std::filesystem::is_empty(directory.path / "a" / "b"));
-  }
+  refuse_unwritable(directory.path / "a" / "b");
+  refuse_unwritable(directory.path / "a" / "b" / "");
+  EXPECT_TRUE(std::filesystem::is_empty(directory.path));
+  std::filesystem::create_directory(directory.path / "a");
+  refuse_unwritable(directory.path / "a" / "b");
+  EXPECT_EQ(directory.count(), 1U);
+  EXPECT_TRUE(std::filesystem::is_empty(directory.path / "a"));
+  std::filesystem::remove(directory.path / "a");
+  std::filesystem::create_symlink(directory.path / "nowhere" / "at_all", directory.path / "link");
+  EXPECT_NE(refusal([&] { refuse_unwritable(directory.path / "link"); }), "");
+  EXPECT_TRUE(std::filesystem::is_symlink(directory.path / "link"));
   write_file(directory.path / "file", "");
+  refuse_unwritable_file(directory.path / "file");
+  EXPECT_EQ(refusal([&] { refuse_unwritable_file(directory.path); }), refusal([&] { write_file(directory.path, "x"); }));
   for (const std::filesystem::path& place : {directory.path / "file", directory.path / "file" / "a" / "b", std::filesystem::path("/proc/out")}) {
     const std::string told = refusal([&] { refuse_unwritable(place); });
     EXPECT_TRUE(told.starts_with(place.string() + "||cannot be written: ")) << told;

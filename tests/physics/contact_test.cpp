@@ -55,6 +55,48 @@ StateOf<Dim> laid_on(const SceneOf<Dim>& scene, double gap) {
 template <int Dim>
 void look_at_nothing(const StateOf<Dim>&, const StateOf<Dim>&, const ImpulsesOf<Dim>&) {}
 
+template <int Dim>
+ContactWork contact_work(Method method, const SceneOf<Dim>& scene, StateOf<Dim> state, int steps) {
+  const auto stepper = make_stepper<Dim>(method, scene);
+  ImpulsesOf<Dim> impulses = make_impulses(scene);
+  const Eigen::VectorXd passive = Eigen::VectorXd::Ones(scene.body.edge_count());
+  for (int s = 0; s < steps; ++s) EXPECT_EQ(stepper->step(kDt, passive, nullptr, state, impulses), Termination::kDone);
+  ContactWork work = stepper->work().by_impulses;
+  return work += stepper->work().by_potential;
+}
+
+METHOD_TEST(Contact, IsCountedAsOftenAsItSearchesLooksAndPushes) {
+  constexpr int kSteps = 12;
+  const BodyOf<Dim> body = bar<Dim>(3, 2, 2, 0.1);
+  SceneOf<Dim> alone = on_slope(body, Slope::kHalfSpace, 0, 0.5);
+  const StateOf<Dim> lying = laid_on(alone, -1e-4), far = laid_on(alone, 3);
+  const double places = alone.contact_points.count();
+  const ContactWork above = contact_work(method, alone, far, kSteps), on_plane = contact_work(method, alone, lying, kSteps);
+  alone.obstacles.clear();
+  const ContactWork nothing = contact_work(method, alone, lying, kSteps);
+  EXPECT_EQ(nothing.searched + nothing.looks + nothing.wide_looks + nothing.pushes, 0);
+  EXPECT_EQ(above.searched, kSteps * places);
+  EXPECT_EQ(above.looks + above.wide_looks + above.pushes, 0);
+  EXPECT_GE(on_plane.searched, kSteps * places);
+  EXPECT_GT(on_plane.looks, 0);
+  EXPECT_GT(on_plane.pushes, 0);
+  EXPECT_EQ(on_plane.wide_looks, 0);  // a plane is felt by places alone
+  const SceneOf<Dim> on_box = on_slope(body, Slope::kBox, 0, 0.5);
+  const ContactWork box = contact_work(method, on_box, lying, kSteps);
+  EXPECT_GT(box.searched, on_plane.searched);
+  EXPECT_GT(box.wide_looks, 0);
+  for (const ContactWork& work : {above, on_plane, box}) EXPECT_EQ(work.own_searched, 0);
+}
+
+METHOD_TEST(Contact, OfABodyWithItselfIsCounted) {
+  const BodyOf<Dim> body = bar<Dim>(8, 1, 1, 0.1);
+  SceneOf<Dim> scene = on_slope(body, Slope::kHalfSpace, 0, 0.5);
+  const StateOf<Dim> lying = laid_on(scene, -1e-4);
+  EXPECT_EQ(contact_work(method, scene, lying, 4).own_searched, 0);
+  scene.self_contact.is_on = true;
+  EXPECT_GT(contact_work(method, scene, lying, 4).own_searched, 0);
+}
+
 METHOD_TEST(Contact, HoldsABlockOnASlopeOfAnyKindWithinTheCone) {
   for (const Slope kind : kSlopes) {
     if (is_draft(method) && kind != Slope::kHalfSpace) continue;  // contact is the explicit method's

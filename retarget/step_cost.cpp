@@ -60,12 +60,12 @@ constexpr ContactCosts kContact[2] = {
     {26, 3200, 240, 0.33, 15, 15, 18},
     {26, 4500, 180, 0, 30, 0.67, 81},
 };
-// Of corrections likewise, as closed loops of the trot, the worm, a fox and a snake pay them on 32 to 760 nodes (hydrostat bench speed): half of
-// these 32 lie within 0.98 and 1.33 of 1.3 times the time, all within 0.72 and 1.82. All had 117 muscles: what hangs on their number alone is
-// kMuscles' share.
+// Of corrections likewise, as closed loops of the trot, the worm, a fox, a snake and a man pay them on 32 to 480 nodes (hydrostat bench
+// speed): half of these 35 lie within 1.02 and 1.72 of 1.3 times the time, all within 0.69 and 2.11, for how often the response is made
+// anew hangs on the motion. All had 117 muscles: what hangs on their number alone is kMuscles' share.
 constexpr StepParts kResponseAssembly{.nodes = 45, .edges = 67, .simplices = 1970, .boxes = 6770};
-constexpr double kResponseProduct = 10;   // [ns] of two blocks
-constexpr double kColumnProduct = 2.5;   // [ns] of a block and one of many columns
+constexpr double kResponseProduct = 10;    // [ns] of two blocks
+constexpr double kColumnProduct = 2.5;     // [ns] of a block and one of many columns
 constexpr double kNormal = 0.27;          // [ns] of a product in the normal equations
 constexpr double kPlayed = 0.13;          // [ns] of a channel and a wave of it, two a harmonic, in playing signals
 constexpr double kRows = 7.4;             // [ns] of a row and a muscle, in all that each call asks of the response

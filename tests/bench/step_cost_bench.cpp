@@ -1,9 +1,10 @@
 // How far counted work (retarget/step_cost.h) is from processor time: bars in the plane and in space, of springs, of triangles or
 // tets and of quads or hexahedra, soft and stiff, held in the air, held in water, lying on the ground, on balls, on a block and in two
-// halves that bump into each other, with activations and without, by every method in short and long steps. Usage: step_cost_bench [-o DIR] [-r ROUNDS] [-f FIT [-k SLOWER]]. Writes
-// DIR/costs.csv (default DIR: out/costs), a line a run with what was counted and the least time of ROUNDS (4), and prints in
-// markdown for each method and kind of body the median of counted over measured, and within what nine of ten lie. FIT: a file for
-// the table of constants that these times ask for, of a machine that is SLOWER times as slow as this one (1).
+// halves that bump into each other, with activations and without, by every method in short and long steps. Usage:
+// step_cost_bench [-o DIR] [-r ROUNDS] [-f FIT [-k SLOWER]]. Writes DIR/costs.csv (default DIR: out/costs), a line a run with what was
+// counted and the least time of ROUNDS (4), and prints in markdown for each method and kind of body the median of counted over measured,
+// and within what nine of ten lie. FIT: a file for the table of constants that these times ask for, of a machine that is SLOWER times
+// as slow as this one (1).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -165,7 +166,6 @@ void print_table(const std::vector<Run>& runs) {
   }
 }
 
-using retarget::StepCosts;
 using retarget::StepParts;
 
 struct Part {

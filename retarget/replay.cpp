@@ -15,6 +15,7 @@
 #include "retarget/reference_glide.h"
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
+#include "retarget/roll_brace.h"
 #include "retarget/state_estimate.h"
 #include "retarget/strength_estimate.h"
 #include "retarget/stride_feedback.h"
@@ -84,6 +85,7 @@ class Run {
   std::optional<StrengthEstimate> strength_;  // where the plan leaps again and again and the body is seen as it is
   StrideFeedback stride_;
   ReturnMap return_map_;
+  RollBrace brace_;
   long cycles_ = 0;  // of a loop, whose ends were seen
 
   double time_s_ = 0, busy_s_ = 0;
@@ -127,6 +129,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       planned_(input.prepared),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),
+      brace_(input.prepared, input.scene.body, input.scene.gravity.norm()),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
       state_(first_state(target_, curve_, path_)),
       activation_(input.scene.body.edge_count()),
@@ -243,6 +246,7 @@ void Run::control() {
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
   stride_.follow(fit_, control_s_);
+  brace_.follow(fit_, time_s_, control_s_);
   keep_way();
   planned_.look(time_s_, options_.corrector.horizon_s, uneven_.has_value(), contact_);
   if (uneven_) {
@@ -267,6 +271,7 @@ void Run::command(double time_s) {
     strength_->apply(commanded_.x, activation_);
   }
   stride_.apply(time_s, activation_);
+  brace_.apply(activation_);
   return_map_.apply(time_s, activation_);
 }
 

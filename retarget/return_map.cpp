@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "retarget/leaps.h"
+#include "retarget/long_axis.h"
 #include "retarget/reference_glide.h"
 
 namespace hydrostat::retarget {
@@ -32,17 +33,12 @@ Eigen::Vector3d per_length(const WayError& error, double length) {
 /// behind; up to 1, E x 2. Front is one end of the longest axis on the ground of the rest shape, as it lies in the target's
 /// first frame.
 Eigen::MatrixXd sideways_bends(const physics::Body& body, const Motion& target) {
-  const Eigen::VectorXd shares = body.mass / body.mass.sum();
-  const RigidFit fit = best_rigid_fit(body.rest, target.at(0), shares);
-  const Eigen::Matrix3Xd arms = fit.rotation * (body.rest.colwise() - fit.mean_a);
-  const double xx = arms.row(0).cwiseAbs2() * shares, zz = arms.row(2).cwiseAbs2() * shares;
-  const double xz = arms.row(0).cwiseProduct(arms.row(2)) * shares, angle = 0.5 * std::atan2(2 * xz, xx - zz);
-  const Eigen::Vector3d along(std::cos(angle), 0, std::sin(angle)), right = along.cross(Eigen::Vector3d::UnitY());
+  const LongAxis axis = long_axis(body, target);
+  const Eigen::VectorXd right = bends_across(axis, body.edges) * axis.along.cross(Eigen::Vector3d::UnitY());
   Eigen::MatrixXd bends(body.edge_count(), 2);
   for (int e = 0; e < body.edge_count(); ++e) {
-    const Eigen::Vector3d from = arms.col(body.edges(0, e)), to = arms.col(body.edges(1, e));
-    const double bend = std::pow((to - from).normalized().dot(along), 2) * right.dot(from + to);
-    bends.row(e) << bend, bend * along.dot(from + to);
+    const double place = axis.along.dot(axis.arms.col(body.edges(0, e)) + axis.arms.col(body.edges(1, e)));
+    bends.row(e) << right[e], right[e] * place;
   }
   for (auto bend : bends.colwise()) bend /= std::max(bend.cwiseAbs().maxCoeff(), 1e-300);
   return bends;

@@ -45,5 +45,15 @@ TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
   EXPECT_NEAR(std::stod(climbed.out.substr(travel + 7)), 0.435, 0.02) << climbed.out;  // L a cycle
 }
 
+TEST(Pushes, TheWormDoesNotRollAwayFromThoseThatComeFromTheSide) {
+  const TemporaryDirectory directory;
+  convert(directory.path, "worm_crawl.glb", "creature", "--nodes 100");
+  for (const char* push : {"0.5:0:0", "-0.5:0:0"}) {
+    const Outcome pushed =
+        hydrostat_in(directory.path, std::string("replay creature --quiet --cycles 4 -o pushed.glb --push t=4.5,dv=") + push);
+    EXPECT_EQ(pushed.exit_code, 0) << push << ": " << pushed.out << pushed.err;
+  }
+}
+
 }  // namespace
 }  // namespace hydrostat::seeds_test

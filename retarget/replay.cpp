@@ -85,7 +85,7 @@ class Run {
   std::optional<StrengthEstimate> strength_;  // where the plan leaps again and again and the body is seen as it is
   StrideFeedback stride_;
   ReturnMap return_map_;
-  RollBrace brace_;
+  std::optional<RollBrace> brace_;  // where the body is seen as it is: it goes by how fast that rolls
   long cycles_ = 0;  // of a loop, whose ends were seen
 
   double time_s_ = 0, busy_s_ = 0;
@@ -129,7 +129,6 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       planned_(input.prepared),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),
-      brace_(input.prepared, input.scene.body, input.scene.gravity.norm()),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
       state_(first_state(target_, curve_, path_)),
       activation_(input.scene.body.edge_count()),
@@ -148,6 +147,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   const bool is_seen = options.correct && options.observation.is_exact();
   if (is_seen && target_.loop && has_flight(input.prepared)) strength_.emplace(input.model, control_s_);
+  if (is_seen) brace_.emplace(input.prepared, input.scene.body, input.scene.gravity.norm());
   if (options.lesson) options.lesson->make_room(activation_.size(), state_.x.size(), steps_);
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);
@@ -246,7 +246,7 @@ void Run::control() {
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
   stride_.follow(fit_, control_s_);
-  brace_.follow(fit_, time_s_, control_s_);
+  if (brace_) brace_->follow(fit_, time_s_, control_s_);
   keep_way();
   planned_.look(time_s_, options_.corrector.horizon_s, uneven_.has_value(), contact_);
   if (uneven_) {
@@ -271,7 +271,7 @@ void Run::command(double time_s) {
     strength_->apply(commanded_.x, activation_);
   }
   stride_.apply(time_s, activation_);
-  brace_.apply(activation_);
+  if (brace_) brace_->apply(activation_);
   return_map_.apply(time_s, activation_);
 }
 

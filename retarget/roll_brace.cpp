@@ -11,7 +11,7 @@ constexpr double kSlender = 2;     // what is less slender rolls about no axis o
 constexpr double kByRoll = 0.6;    // activation per radian of roll
 constexpr double kByRate = 1.35;   // the same per radian in the time sqrt(h / g)
 constexpr double kIdle = 0.1;      // less is left alone: a crawl rolls by as much, and what answers to it rocks on
-constexpr double kMost = 0.38;     // activation
+constexpr double kMost = 0.39;     // activation
 constexpr double kSmoothing = 1.0 / 3;  // of sqrt(h / g)
 constexpr double kOwnPlane = 0.4;  // share of the body's own side in that to which it bends; the rest is level
 

@@ -10,6 +10,8 @@ import { centre, floats, indices, kRoles, mark_of } from './data.js';
 import { Looks } from './looks.js';
 import { Morphs } from './morphs.js';
 
+const kLowLeap = 0.25; // of L: how far a creature rises before the camera rises with it
+
 /** The skin that control nodes carry: vertex v is the weighted sum of its four nodes. */
 function embed(nodes, skin, out) {
   for (let v = 0; v < out.length / 3; ++v) {
@@ -227,6 +229,7 @@ export class Stage {
     const start = centre(this.leader.at(0));
     this.focus = new Vector3(start[0], 0.5 * (start[1] + this.ground_height), start[2]);
     if (this.is_scene) this.focus.set(...(this.whole?.centre ?? start));
+    this.ground_view = { focus: this.focus.y, centre: start[1] };
     this.controls.target.copy(this.focus);
     this.camera_way = new Vector3(0.45 * hx - hz, 0.42, 0.45 * hz + hx).normalize();
     if (this.is_flat) this.camera_way.set(...(this.performers.length > 1 ? [0.8, 0.7, 1] : [0.12, 0.16, 1])).normalize(); // side by side is one behind the other
@@ -340,7 +343,8 @@ export class Stage {
   follow(t) {
     if (!this.leader) return;
     const [x, y, z] = centre(this.leader.at(t));
-    const climb = this.is_scene ? y - this.focus.y : 0;
+    const leap = Math.max(0, y - this.ground_view.centre - kLowLeap * this.length); // what is no higher stays in view
+    const climb = (this.is_scene ? y : this.ground_view.focus + leap) - this.focus.y;
     const move = this.whole ? new Vector3() : new Vector3(x - this.focus.x, climb, z - this.focus.z);
     this.focus.add(move);
     if (this.follows) {

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "retarget/contact_cones.h"
 #include "retarget/contact_loads.h"
@@ -74,38 +75,56 @@ double Corrector::weigh_momentum(const physics::State& state, double grip) {
   return weighted_.topRightCorner<6, 1>().norm() / options_.root_weight;
 }
 
-/// The mean of each foot in the air, on its way to where it can catch the body.
-void Corrector::weigh_feet(const physics::State& state, const physics::State& reference,
-                           const ContactNow& contact) {
+/// To where the body can be caught, and how soon a foot has to be there.
+void Corrector::find_step(const physics::State& state, const physics::State& reference) {
   const physics::Body& body = scene_.body;
   const Eigen::Vector3d up = scene_.ground.normal, com = physics::centre_of_mass(body, reference.x);
   const double height = std::max(0.0, up.dot(com) - scene_.ground.offset), gravity = scene_.gravity.norm();
   const double ahead_s = gravity > 0 ? options_.step_ahead * std::sqrt(height / gravity) : 0;
   const Eigen::Vector3d ahead =
       physics::centre_of_mass(body, state.x) - com + ahead_s * (state.v - reference.v) * body.mass / body.mass.sum();
-  const Eigen::Vector3d step = options_.step * (ahead - up.dot(ahead) * up);
+  step_ = options_.step * (ahead - up.dot(ahead) * up);
+  const double long_step = options_.long_step * height;
+  haste_ = long_step > 0 ? std::clamp(step_.norm() / long_step - 1, 0.0, 1.0) : 0;
+}
+
+/// The mean of each foot in the air, on its way to where it can catch the body.
+void Corrector::weigh_feet(const physics::State& state, const physics::State& reference,
+                           const ContactNow& contact) {
+  const physics::ContactPoints& points = scene_.contact_points;
+  const Eigen::Vector3d up = scene_.ground.normal;
   const Eigen::Index last = responses_.velocities().cols();
   Eigen::Index row = 6;
   for (std::size_t k = 0; k < contact.in_air.size(); ++k) {
     const Patch* foot = contact.in_air[k];
     auto mean = weighted_.middleRows<3>(row);
     mean.setZero();
-    Eigen::Vector3d error = -step;
-    if (!contact.lead.empty()) error -= contact.lead[k];
+    Eigen::Vector3d error = -step_;
     const double share = 1 / static_cast<double>(foot->points.size());
+    double height = std::numeric_limits<double>::infinity();  // of the sole, by plan
     for (const int p : foot->points) {
-      for (int c = 0; c < scene_.contact_points.nodes.rows(); ++c) {
-        const int node = scene_.contact_points.nodes(c, p);
-        const double weight = share * scene_.contact_points.weights(c, p);
+      for (int c = 0; c < points.nodes.rows(); ++c) {
+        const int node = points.nodes(c, p);
+        const double weight = share * points.weights(c, p);
         mean.leftCols(last) += weight * responses_.velocities().middleRows<3>(3 * node);
         mean.col(last) += weight * deviation_.segment<3>(3 * node);
       }
-      error += share * (scene_.contact_points.of(state.x, p) - scene_.contact_points.of(reference.x, p));
+      const Eigen::Vector3d planned = points.of(reference.x, p);
+      error += share * (points.of(state.x, p) - planned);
+      height = std::min(height, up.dot(planned) - scene_.ground.offset);
     }
+    // What is led over uneven ground is to clear it first.
+    error += contact.lead.empty() ? Eigen::Vector3d(haste_ * std::max(0.0, height) * up) : -contact.lead[k];
     mean.col(last) += error / options_.foot_settle_s;
     mean *= (contact.lead.empty() ? 1 : kLedFoot) * options_.foot_weight / speed_unit_;
     row += 3;
   }
+}
+
+std::vector<bool> Corrector::held_to_cones(const ContactNow& contact) const {
+  std::vector<bool> held = contact.bearing;
+  for (std::size_t p = 0; haste_ > 0 && p < held.size(); ++p) held[p] = held[p] || contact.on_leg[p];
+  return held;
 }
 
 double Corrector::least_margin() const {
@@ -127,9 +146,10 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
 
   // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.
   weighted_.resize(6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
+  find_step(state, reference);
   weigh_feet(state, reference, contact);
   const double weight = body.mass.sum() * gravity_unit(scene_);
-  cone_rows(scene_, contact.touching, contact.bearing, contact.force / weight,
+  cone_rows(scene_, contact.touching, held_to_cones(contact), contact.force / weight,
             (contact_stiffness_ * options_.horizon_s / weight) * responses_.velocities(), previous_, cones_);
   deviation_ += (state.x - reference.x).reshaped() / options_.settle_s;
   momentum_error_ = weigh_momentum(state, contact.grip);

@@ -22,6 +22,7 @@ struct CorrectorOptions {
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
   double clearance = 0.03;      // of L: over what a foot in the air is to step onto or across
   double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
+  double long_step = 0.15;      // of h: what is longer is stepped at once, whatever the plan; infinite: never
   int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
 };
 
@@ -30,6 +31,7 @@ struct ContactNow {
   std::vector<ContactState> touching;  // P: a sliding point holds the body up but not back
   Eigen::Matrix3Xd force;              // 3 x P [N], of the control step before
   std::vector<bool> bearing;           // P: by plan it bears load now and until the horizon's end
+  std::vector<bool> on_leg;            // P: of a patch on a leg
   std::vector<const Patch*> in_air;    // patches on legs that touch nothing; they must outlive the call
   std::vector<Eigen::Vector3d> lead;   // [m] of each of them: by how much what lies ahead moves it from its reference; empty: not
   double grip = 1;  // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
@@ -43,7 +45,9 @@ struct ContactNow {
 /// contact forces over their cones (contact_cones.h). Effort is dear while the error is small, for a creature on a narrow base
 /// sways against a gain that a push calls for. W weighs the nodes by mass, the six rows of momentum, and the mean of
 /// each foot in the air, which is sent to where the centre of mass can be caught: its error moves by e + c sqrt(h / g) e'
-/// with the error e of the centre of mass over the ground and its height h. Sources: the design, section 8; Raibert, "Legged
+/// with the error e of the centre of mass over the ground and its height h. Where that is a long step the feet come down at once, for
+/// the plan's swing ends when the body has fallen past them, and every foot that touches is asked to stay within its cone, for then
+/// the plan does not know which of them bear. Sources: the design, section 8; Raibert, "Legged
 /// Robots That Balance", 1986, for the placement of feet by speed; Pratt et al., "Capture Point: A Step toward Humanoid Push
 /// Recovery", Humanoids 2006, for the way that sqrt(h / g) gives.
 class Corrector {
@@ -65,7 +69,9 @@ class Corrector {
  private:
   void find_free_deviation(const physics::State& state, const physics::State& reference);
   double weigh_momentum(const physics::State& state, double grip);
+  void find_step(const physics::State& state, const physics::State& reference);
   void weigh_feet(const physics::State& state, const physics::State& reference, const ContactNow& contact);
+  std::vector<bool> held_to_cones(const ContactNow& contact) const;
 
   const physics::Scene& scene_;
   const Muscles& muscles_;
@@ -76,6 +82,8 @@ class Corrector {
   physics::InternalForces<3> forces_;
   double momentum_error_ = 0;      // at the last call, in speeds per sqrt(g L)
   Eigen::VectorXd deviation_;      // 3N: the change of velocity that comes without any muscle, later with the error of place
+  Eigen::Vector3d step_ = Eigen::Vector3d::Zero();  // [m] over the ground, by which a foot in the air is to land elsewhere
+  double haste_ = 0;               // 0 where that is no long step, 1 from twice a long one on
   Eigen::MatrixXd weighted_, normal_, cones_;  // weighted_: the few rows beside the nodes', x (muscles + 1)
   Eigen::VectorXd previous_;
   Eigen::Matrix3Xd force_, reference_force_;

@@ -14,6 +14,10 @@ ContactNow PlannedContacts::first() const {
   ContactNow now;
   now.touching.resize(static_cast<std::size_t>(points), ContactState::kOff);
   now.bearing.resize(now.touching.size(), false);
+  now.on_leg.resize(now.touching.size(), false);
+  for (const Patch& patch : plan_.contacts.patches) {
+    for (const int p : patch.points) now.on_leg[static_cast<std::size_t>(p)] = patch.on_leg;
+  }
   now.force.setZero(3, points);
   for (Eigen::Index p = 0; p < points; ++p) {
     if (plan_.contacts.touching(p, 0)) now.touching[static_cast<std::size_t>(p)] = ContactState::kStick;

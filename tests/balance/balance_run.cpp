@@ -45,6 +45,7 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
                                              {"horizon", &options.horizon_s}, {"cone", &options.cone_weight},
                                              {"foot", &options.foot_weight},  {"foot_settle", &options.foot_settle_s},
                                              {"step", &options.step},         {"ahead", &options.step_ahead},
+                                             {"long_step", &options.long_step},
                                              {"clearance", &options.clearance},
                                              {"calm", &options.calm},         {"calm_error", &options.calm_error},
                                              {"slope", &slope.degrees},       {"side", &slope.side},

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 #include <string>
 
@@ -28,6 +29,7 @@ struct Controlled {
     ContactNow contact;
     contact.touching.assign(static_cast<std::size_t>(points), state);
     contact.bearing.assign(contact.touching.size(), false);
+    contact.on_leg.assign(contact.touching.size(), true);
     contact.force.setZero(3, points);
     return contact;
   }
@@ -198,6 +200,70 @@ TEST(Corrector, SendsAFootInTheAirWhereItCatchesTheBody) {
   }
 }
 
+/// Height [m] of the first foot over the centre of mass after `activation` was held for a while in the air.
+double foot_after(const Controlled& controlled, const Eigen::VectorXd& activation, physics::State state) {
+  const physics::Scene& scene = controlled.creature.scene;
+  state.x.row(1).array() += 0.05;
+  const auto stepper = physics::make_explicit_stepper(scene);
+  physics::Impulses impulses = physics::make_impulses(scene);
+  for (int s = 0; s < 8; ++s) stepper->step(1.0 / 240, activation, nullptr, state, impulses);
+  double height = 0;
+  for (const int p : controlled.lifted.points) height += scene.contact_points.of(state.x, p).y();
+  return height / static_cast<double>(controlled.lifted.points.size()) - (scene.body.mass.transpose() * state.x.row(1).transpose())(0) / scene.body.mass.sum();
+}
+
+TEST(Corrector, ALongStepIsTakenAtOnceAndAShortOneAsPlanned) {
+  const Controlled controlled;
+  const physics::Body& body = controlled.creature.scene.body;
+  physics::State reference = controlled.rest;
+  reference.x.row(1).array() += 0.03;  // feet are up by plan
+  const double height = (reference.x.row(1) * body.mass)(0) / body.mass.sum() - controlled.creature.scene.ground.offset;
+  const double ahead_s = CorrectorOptions().step_ahead * std::sqrt(height / 9.81);
+  for (const Eigen::Vector3d& direction : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0), Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+    for (const double long_steps : {0.9, 2.5}) {
+      physics::State state = reference;
+      state.v.colwise() += long_steps * CorrectorOptions().long_step * height / ahead_s * direction;
+      double foot[2];
+      for (const bool at_once : {false, true}) {
+        CorrectorOptions options;
+        options.cone_weight = 0;
+        if (!at_once) options.long_step = std::numeric_limits<double>::infinity();
+        Corrector corrector = controlled.corrector(options);
+        Eigen::VectorXd activation = controlled.passive;
+        corrector.correct(state, reference, controlled.on_three_legs(), activation);
+        foot[at_once] = foot_after(controlled, activation, state);
+      }
+      SCOPED_TRACE(::testing::Message() << long_steps << " long steps along " << direction.transpose());
+      if (long_steps < 1) {
+        EXPECT_EQ(foot[1], foot[0]);
+      } else {
+        EXPECT_LT(foot[1], foot[0] - 1e-4);
+      }
+    }
+  }
+}
+
+TEST(Corrector, AFootThatTouchesAgainstThePlanIsNotPulledAtWhileALongStepIsTaken) {
+  // As in DoesNotPullAtTheGround, but nothing is to bear load: the left feet do, and the others are off the ground by plan.
+  const Controlled controlled;
+  ContactNow contact = controlled.bearing();
+  contact.bearing.assign(contact.bearing.size(), false);
+  const double share = 1 / static_cast<double>(contact.touching.size());
+  physics::State state = controlled.rest;
+  for (Eigen::Index i = 0; i < state.x.cols(); ++i) {
+    state.v.col(i) = Eigen::Vector3d(5, 0, 0).cross(state.x.col(i) - Eigen::Vector3d(0, 0, 0.4));
+  }
+  Eigen::VectorXd activation = controlled.passive;
+  Corrector corrector = controlled.corrector();
+  corrector.correct(state, controlled.rest, contact, activation);
+  EXPECT_NE(corrector.least_margin(), 0);
+  EXPECT_GT(corrector.least_margin() / share, -0.05);
+  contact.on_leg.assign(contact.on_leg.size(), false);
+  Corrector trunk = controlled.corrector();
+  trunk.correct(state, controlled.rest, contact, activation);
+  EXPECT_EQ(trunk.least_margin(), 0) << "what is on no leg does not step";
+}
+
 TEST(Corrector, KeepsToTheLimit) {
   const Controlled controlled;
   for (unsigned seed = 0; seed < 20; ++seed) {
@@ -222,6 +288,7 @@ TEST(Corrector, AnswersTwiceTheErrorWithTwiceTheMusclesOrWithMoreWhereItIsCalm) 
     state.v.colwise() += share * Eigen::Vector3d(0.05, 0, 0.02);
     CorrectorOptions options;
     options.calm = calm;
+    options.long_step = std::numeric_limits<double>::infinity();  // cones are not linear
     Corrector corrector = controlled.corrector(options);
     Eigen::VectorXd activation = controlled.passive;
     corrector.correct(state, controlled.rest, controlled.standing, activation);

@@ -51,6 +51,15 @@ TEST(PlannedContacts, AFootOnALegThatTouchesNothingIsInTheAirAndOnUnevenGroundOn
   }
 }
 
+TEST(PlannedContacts, TellsWhichPointsAreOnLegs) {
+  Stepping stepping;
+  stepping.plan.contacts.patches[1].on_leg = false;
+  const ContactNow contact = PlannedContacts(stepping.plan).first();
+  for (std::size_t k = 0; k < stepping.plan.contacts.patches.size(); ++k) {
+    for (const int p : stepping.plan.contacts.patches[k].points) EXPECT_EQ(contact.on_leg[static_cast<std::size_t>(p)], k != 1);
+  }
+}
+
 TEST(PlannedContacts, WhatIsToSlideHasNoGrip) {
   Stepping stepping;
   stepping.plan.contacts.state[1][4] = ContactState::kSlide;

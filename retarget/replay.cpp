@@ -8,6 +8,7 @@
 #include "retarget/cpu_seconds.h"
 #include "retarget/divergence.h"
 #include "retarget/fall.h"
+#include "retarget/leap_feedback.h"
 #include "retarget/leaps.h"
 #include "retarget/obstacle_moves.h"
 #include "retarget/path_gain.h"
@@ -85,6 +86,7 @@ class Run {
   std::optional<StrengthEstimate> strength_;  // where the plan leaps again and again and the body is seen as it is
   StrideFeedback stride_;
   ReturnMap return_map_;
+  LeapFeedback leap_;
   std::optional<RollBrace> brace_;  // where the body is seen as it is: it goes by how fast that rolls
   long cycles_ = 0;  // of a loop, whose ends were seen
 
@@ -129,6 +131,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       planned_(input.prepared),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),
+      leap_(input.prepared, input.length),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
       state_(first_state(target_, curve_, path_)),
       activation_(input.scene.body.edge_count()),
@@ -161,7 +164,9 @@ void Run::keep_way() {
   const double period = target_.duration_s();
   if (!target_.loop || stride_.steers() || time_s_ + 1e-9 < static_cast<double>(cycles_ + 1) * period) return;
   ++cycles_;
-  return_map_.end_cycle(return_map_.way_error(fit_, cycles_));
+  const WayError error = return_map_.way_error(fit_, cycles_);
+  return_map_.end_cycle(error);
+  if (leap_.is_needed()) leap_.end_cycle(error);
   const bool is_there_time = time_s_ + period <= options_.duration_s + 1e-9;
   if (return_map_.wants_to_learn() && is_there_time) return_map_.learn(ask_model());
 }
@@ -248,6 +253,7 @@ void Run::control() {
   stride_.follow(fit_, control_s_);
   if (brace_) brace_->follow(fit_, time_s_, control_s_);
   keep_way();
+  leap_.apply(time_s_, glide_.yaw, glided_);
   planned_.look(time_s_, options_.corrector.horizon_s, uneven_.has_value(), contact_);
   if (uneven_) {
     uneven_->look(time_s_, control_s_, fit_, seen);

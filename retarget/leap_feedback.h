@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "physics/stepper.h"
+#include "retarget/prepare.h"
+#include "retarget/return_map.h"
+
+namespace hydrostat::retarget {
+
+/// Feedback once a cycle for a loop that leaps. Where a leap ends is settled by the velocity with which it begins, so that what a body is
+/// off its place at the end of a cycle leads the velocity of the reference while the next push-off lasts: it leaps a little farther, or
+/// a little to the side. Source: Raibert, "Legged Robots That Balance", 1986, where the stance before a hop settles its way; window,
+/// gains and bounds were measured on a hopping frog.
+class LeapFeedback {
+ public:
+  /// length [m] is L. What is played once, or never flies, it leaves alone.
+  LeapFeedback(const PreparedTarget& plan, double length);
+
+  bool is_needed() const { return !pushes_off_.empty(); }
+  /// `error` at the end of a cycle, as ReturnMap::way_error has it.
+  void end_cycle(const WayError& error);
+  /// Changes the velocities of the reference of a time [s] that was turned by `yaw` [rad] from the target.
+  void apply(double time_s, double yaw, physics::State& reference) const;
+  const Eigen::Vector3d& lead() const { return lead_; }  // [m/s], as seen where the target begins
+
+ private:
+  const double length_, period_s_, rate_hz_, yaw_;  // yaw_: of the target in a cycle [rad]
+  std::vector<bool> pushes_off_;                    // F: a flight is about to begin; empty where it is not needed
+  Eigen::Vector3d way_ = Eigen::Vector3d::Zero();   // unit; zero where the target does not travel
+  Eigen::Vector3d lead_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace hydrostat::retarget

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace hydrostat::retarget {
 namespace {
@@ -93,7 +94,9 @@ CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOption
   CorrectorOptions result = options;
   if (!has_flight(plan)) return result;
   result.foot_weight *= kFeetOfLeaps;
-  if (plan.target.loop) result.root_weight *= kMomentumOfHops;
+  if (!plan.target.loop) return result;
+  result.root_weight *= kMomentumOfHops;
+  result.long_step = std::numeric_limits<double>::infinity();
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <string>
 
@@ -130,9 +131,12 @@ TEST(GainOfLeaps, IsTheUsualOfWhatNeverFlies) {
   EXPECT_EQ(walk.root_weight, usual.root_weight);
   EXPECT_LT(hops.foot_weight, usual.foot_weight);
   EXPECT_LT(hops.root_weight, usual.root_weight);
+  EXPECT_TRUE(std::isinf(hops.long_step)) << "the next hop makes up for it";
+  EXPECT_EQ(walk.long_step, usual.long_step);
   const CorrectorOptions jump = gain_of(leap({20, 20}, {10, 10}, false));
   EXPECT_LT(jump.foot_weight, usual.foot_weight);
   EXPECT_EQ(jump.root_weight, usual.root_weight) << "it has to stand where it lands";
+  EXPECT_EQ(jump.long_step, usual.long_step);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kPushOff = 0.1;                    // [s] before a flight
-constexpr double kAlong = 2, kAside = 0.4;          // [1/s] of an error of place; aside 1 fells one frog in seven
+constexpr double kAlong = 2, kAside = 0.4;          // [1/s] of an error of place
 constexpr double kMostAlong = 1, kMostAside = 0.5;  // [1/s] of L
 constexpr double kLeastStride = 0.02;               // of L: less is no way
 

@@ -11,7 +11,7 @@ namespace hydrostat::retarget {
 /// Feedback once a cycle for a loop that leaps. Where a leap ends is settled by the velocity with which it begins, so that what a body is
 /// off its place at the end of a cycle leads the velocity of the reference while the next push-off lasts: it leaps a little farther, or
 /// a little to the side. Source: Raibert, "Legged Robots That Balance", 1986, where the stance before a hop settles its way; window,
-/// gains and bounds were measured on a hopping frog.
+/// gains and bounds are ours, from trials with one frog.
 class LeapFeedback {
  public:
   /// length [m] is L. What is played once, or never flies, it leaves alone.

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
-constexpr double kOverReach = 1.25;   // times reach: what a clip needs beyond that is held back
+constexpr double kOverReach = 1.5;    // times reach: what a clip needs beyond that is held back
 constexpr double kFar = 0.04;         // of L: further no shift should move a clip
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts

@@ -10,6 +10,7 @@ namespace {
 constexpr double kLeap = 0.05;     // [s] in the air: less is a flicker of contacts
 constexpr double kLanding = 0.07;  // [s] from the flight to the last foot that lands
 constexpr double kFeetOfLeaps = 1.0 / 8, kMomentumOfHops = 0.5;  // of the rows' usual weights
+constexpr double kEffortOfHops = 3.2;  // times the usual
 
 /// Frame f of a loop may lie a period on or before.
 std::size_t wrapped(long f, long frames) { return static_cast<std::size_t>(((f % frames) + frames) % frames); }
@@ -24,6 +25,33 @@ bool lands(const ContactSchedule& contacts, const std::vector<bool>& flying, std
     if (flying[wrapped(f - d, frames)]) return true;
   }
   return false;
+}
+
+struct Stances {
+  ContactSchedule contacts;
+  std::vector<std::vector<Hold>> holds;
+};
+
+/// Lets patch k, which touches in frame f, touch in the `frames` after it, or before it where that is negative, as far as it was off
+/// the ground there, on the place of frame f.
+void lengthen(const Stances& before, const Motion& points, std::size_t k, long f, long frames, ContactSchedule& contacts,
+              std::vector<std::vector<Hold>>& holds) {
+  const long count = points.count(), direction = frames < 0 ? -1 : 1;
+  const std::vector<int>& own = before.contacts.patches[k].points;
+  for (long d = 1; d <= std::abs(frames); ++d) {
+    const long h = f + direction * d;
+    if (!points.loop && (h < 0 || h >= count)) break;
+    const std::size_t g = wrapped(h, count);
+    if (contacts.state[k][g] != ContactState::kOff) break;
+    contacts.state[k][g] = ContactState::kStick;
+    for (const int p : own) contacts.touching(p, static_cast<Eigen::Index>(g)) = before.contacts.touching(p, f);
+    for (Hold hold : before.holds[static_cast<std::size_t>(f)]) {
+      if (std::find(own.begin(), own.end(), hold.point) == own.end()) continue;
+      if (h < 0) hold.place = after_cycles(points, 1) * hold.place;
+      if (h >= count) hold.place = after_cycles(points, -1) * hold.place;
+      holds[g].push_back(hold);
+    }
+  }
 }
 
 }  // namespace
@@ -46,26 +74,25 @@ std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_
   return flying;
 }
 
+void prolong_stances(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds) {
+  const Stances before{contacts, holds};
+  const long count = points.count();
+  for (std::size_t k = 0; k < before.contacts.patches.size(); ++k) {
+    for (long f = 0; f < count; ++f) {
+      if (before.contacts.state[k][static_cast<std::size_t>(f)] != ContactState::kStick) continue;
+      lengthen(before, points, k, f, -frames, contacts, holds);
+      lengthen(before, points, k, f, frames, contacts, holds);
+    }
+  }
+}
+
 void reach_out(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds) {
-  const ContactSchedule before = contacts;
-  const std::vector<std::vector<Hold>> held = holds;
+  const Stances before{contacts, holds};
   const std::vector<bool> flying = frames_in_flight(contacts, points.rate_hz, points.loop);
   const long count = points.count(), landing = std::lround(kLanding * points.rate_hz);
-  for (std::size_t k = 0; k < before.patches.size(); ++k) {
-    const std::vector<int>& own = before.patches[k].points;
+  for (std::size_t k = 0; k < before.contacts.patches.size(); ++k) {
     for (long f = 0; f < count; ++f) {
-      if (!lands(before, flying, k, f, landing, points.loop)) continue;
-      for (long d = 1; d <= frames && (points.loop || d <= f); ++d) {
-        const std::size_t g = wrapped(f - d, count);
-        if (contacts.state[k][g] != ContactState::kOff) break;
-        contacts.state[k][g] = ContactState::kStick;
-        for (const int p : own) contacts.touching(p, static_cast<Eigen::Index>(g)) = before.touching(p, f);
-        for (Hold hold : held[static_cast<std::size_t>(f)]) {
-          if (std::find(own.begin(), own.end(), hold.point) == own.end()) continue;
-          if (d > f) hold.place = after_cycles(points, 1) * hold.place;
-          holds[g].push_back(hold);
-        }
-      }
+      if (lands(before.contacts, flying, k, f, landing, points.loop)) lengthen(before, points, k, f, -frames, contacts, holds);
     }
   }
 }
@@ -96,6 +123,7 @@ CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOption
   result.foot_weight *= kFeetOfLeaps;
   if (!plan.target.loop) return result;
   result.root_weight *= kMomentumOfHops;
+  result.effort *= kEffortOfHops;
   result.long_step = std::numeric_limits<double>::infinity();
   return result;
 }

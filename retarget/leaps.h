@@ -11,9 +11,14 @@ namespace hydrostat::retarget {
 /// Whether a frame lies in a flight: for 0.05 s or longer nothing touches; less is a flicker of contacts. F.
 std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_hz, bool loop);
 
+/// Lets every stance last `frames` longer at both ends, as far as its patch was off the ground there, on the place on which it stands:
+/// what pushes off and lands over a longer time does so with less force, and flies the lower. `points` is the motion of the contact
+/// points, `holds` are find_holds' of `contacts`; both grow by those frames.
+void prolong_stances(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds);
+
 /// Lets every stance that comes out of a flight begin `frames` earlier, on the place on which it will stand: feet that reach out bring
 /// a body to rest over a longer way than feet that come down with it. Patches that stick within 0.07 s after the flight are taken for
-/// those that land. `points` is the motion of the contact points, `holds` are find_holds' of `contacts`; both grow by those frames.
+/// those that land. `contacts` and `holds` grow as prolong_stances' do.
 void reach_out(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds);
 
 /// Whether a patch that is off the ground in a frame, or in the midst of a stance, touches next without a flight before: patches x F. What
@@ -25,8 +30,9 @@ bool has_flight(const PreparedTarget& plan);
 
 /// Feedback for a plan that flies; any other's is as it was. A foot that a landing shakes loose is wanted back on its place rather than
 /// under the body, so that the rows of feet in the air weigh an eighth. A loop has the next hop to make up for an error of momentum,
-/// and the moment of its push is too short to do so at once: these rows weigh half, and no foot hastens to catch it. What is played once
-/// has to stand where it lands.
+/// and the moment of its push is too short to do so at once: these rows weigh half, no foot hastens to catch it, and muscles cost
+/// more: the plan's hop goes on by itself from body to body, and what feedback does in the few frames of a landing shakes it more than
+/// the landing does. What is played once has to stand where it lands.
 CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOptions& options);
 
 }  // namespace hydrostat::retarget

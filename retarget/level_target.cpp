@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "retarget/balance.h"
@@ -202,12 +203,13 @@ void project(const Creature& level, double size, PreparedTarget& prepared) {
       floors(prepared.contacts, prepared.target.loop, options.clearance * size, options.clearance_frames);
   ShapeProjector projector(scene, level.length, true);
   Motion wanted = prepared.target;
-  prepared.target = project_frames(wanted, holds, floor, projector, options.smooth_hz);
+  const Eigen::VectorXd reach = Eigen::VectorXd::Constant(wanted.count(), std::numeric_limits<double>::infinity());
+  prepared.target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
   mark(kTouching);
   for (int round = 0; round < options.rounds && !scene.gravity.isZero(0); ++round) {
     const Shift shift = find_shift(prepared.target, scene, prepared.contacts, level.length, options.support_friction);
     wanted = shifted(wanted, shift, scene.body);
-    prepared.target = project_frames(wanted, holds, floor, projector, options.smooth_hz);
+    prepared.target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
     fall_freely(prepared.contacts, scene, prepared.target);
     mark(kTouching);
   }

@@ -19,12 +19,15 @@ namespace {
 
 constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
-constexpr double kOverReach = 1.5;    // times reach: what a clip needs beyond that is held back
+constexpr double kOverReach = 4.0 / 3;   // times reach: what a clip needs beyond that is held back
 constexpr double kFar = 0.04;         // of L: further no shift should move a clip
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
-constexpr ShiftCosts kLeapCosts{0.1, 2};  // of a leap that would be moved further: it launches by force and lands softly
-constexpr double kReachOut = 1.0 / 60;    // [s] that its feet come down earlier
+constexpr ShiftCosts kLeapCosts{0.1, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
+constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
+constexpr double kReachOut = 1.0 / 60;  // [s] that its feet come down still earlier
+constexpr double kReachInFlight = 0.05; // strain that its shape is held back less where nothing bears,
+constexpr double kClearOfGround[] = {1.0 / 60, 0.1};  // [s] from the last contact on and until so long before the next
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
 
 double rms_difference(const Motion& a, const Motion& b, const Eigen::VectorXd& mass) {
@@ -128,6 +131,24 @@ double reach_of(const Motion& motion, const physics::Body& body, double reach, s
   return reach;
 }
 
+/// F: `reach`, and more where a far leap is clear of the ground: what bears nothing follows its clip further without harm.
+Eigen::VectorXd reach_of_frames(const ContactSchedule& contacts, double rate_hz, bool loop, double reach, bool is_far_leap) {
+  const long frames = contacts.touching.cols();
+  Eigen::VectorXd result = Eigen::VectorXd::Constant(frames, reach);
+  if (!is_far_leap) return result;
+  const long since = std::lround(kClearOfGround[0] * rate_hz), until = std::lround(kClearOfGround[1] * rate_hz);
+  const std::vector<bool> flying = frames_in_flight(contacts, rate_hz, loop);
+  for (long f = 0; f < frames; ++f) {
+    bool is_clear = true;
+    for (long g = f - since; g <= f + until; ++g) {
+      const bool is_inside = loop || (g >= 0 && g < frames);
+      is_clear = is_clear && (!is_inside || flying[static_cast<std::size_t>((g + frames) % frames)]);
+    }
+    if (is_clear) result[f] += kReachInFlight;
+  }
+  return result;
+}
+
 /// Where feet are off the ground because the target has lifted them they bear nothing, nor, in a far leap, where they fly off.
 void mark_loads(const Motion& target, const physics::Scene& scene, double length, double size, bool is_far_leap, ContactSchedule& contacts) {
   const Motion points = point_motion(scene.contact_points, target);
@@ -161,19 +182,23 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   std::vector<std::vector<Hold>> holds = find_holds(contacts, points);
   Eigen::MatrixXd floor;
   Motion locked;
-  std::optional<ShapeProjector> projector;
+  ShapeProjector projector(scene, length, options.volume);
+  std::optional<double> held_to;
+  Eigen::VectorXd reach;
+  bool is_far_leap = false;  // then loads do not fade by themselves before a foot leaves
   const auto set_feet = [&] {
     floor = floors(contacts, grounded.loop, options.clearance * size, options.clearance_frames);
     locked = lock_feet(grounded, scene, contacts, holds, floor, bone_names, node_bone_weights, options.smooth_hz);
-    if (!projector) projector.emplace(scene, length, options.volume, reach_of(locked, body, options.reach, result.warnings));
-    target = project_frames(locked, holds, floor, *projector, options.smooth_hz);
+    if (!held_to) held_to = reach_of(locked, body, options.reach, result.warnings);
+    reach = reach_of_frames(contacts, grounded.rate_hz, grounded.loop, *held_to, is_far_leap);
+    target = project_frames(locked, holds, floor, reach, projector, options.smooth_hz);
   };
-  bool is_far_leap = false;  // then loads do not fade by themselves before a foot leaves
   const auto mark = [&] { mark_loads(target, scene, length, size, is_far_leap, contacts); };
   set_feet();
   mark();
   if (options.momentum) is_far_leap = leaps_far(target, scene, contacts, length, options.support_friction);
   if (is_far_leap) {
+    prolong_stances(points, std::lround(kLonger * points.rate_hz), contacts, holds);
     reach_out(points, std::max(1L, std::lround(kReachOut * points.rate_hz)), contacts, holds);
     set_feet();
     mark();
@@ -185,7 +210,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   for (int round = 0; options.momentum && round < options.rounds; ++round) {
     const Shift shift = find_shift(target, scene, contacts, length, options.support_friction, 60, is_far_leap ? kLeapCosts : ShiftCosts());
     wanted = shifted(wanted, shift, body);
-    target = project_frames(wanted, holds, floor, *projector, options.smooth_hz);
+    target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
     fall_freely(contacts, scene, target);
     mark();
   }

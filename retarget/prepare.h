@@ -12,7 +12,7 @@ struct PrepareOptions {
   int rounds = 3;                // of volume and momentum
   double clearance = 0.015;      // per D: what is not in contact stays that far above the ground, fading towards contacts
   int clearance_frames = 4;      // over which it fades
-  double reach = 0.4;            // strain to which constraints are held where a clip needs more
+  double reach = 0.45;           // strain to which constraints are held where a clip needs more
   bool volume = true, momentum = true;  // off only for ablations
   ContactOptions contacts;
 };

@@ -89,8 +89,8 @@ Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double cleara
   return floor;
 }
 
-ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume, double reach)
-    : scene_(scene), body_(scene.body), matrix_(scene.body), reach_(reach) {
+ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume)
+    : scene_(scene), body_(scene.body), matrix_(scene.body) {
   if (!keep_volume) body_.volume_stiffness.setZero();
   tether_ = kTether * scene.gravity.norm() / length;
   // Light limbs are held to their shape as firmly as the trunk.
@@ -98,11 +98,11 @@ ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool 
   hold_ = kHold * tether_ * body_.mass.mean();
 }
 
-Eigen::Matrix3Xd ShapeProjector::project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor) {
+Eigen::Matrix3Xd ShapeProjector::project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor, double reach) {
   shape_.resize(body_.edge_count());
   for (int e = 0; e < body_.edge_count(); ++e) {
     const double wanted = (target.col(body_.edges(1, e)) - target.col(body_.edges(0, e))).norm() / body_.rest_length[e];
-    shape_[e] = std::clamp(wanted, 1 - reach_, 1 + reach_);
+    shape_[e] = std::clamp(wanted, 1 - reach, 1 + reach);
     body_.edge_stiffness[e] = (shape_[e] == wanted ? kEdgeShare : kReachShare) * scene_.body.edge_stiffness[e];
   }
   Eigen::Matrix3Xd x = target;
@@ -170,12 +170,12 @@ void ShapeProjector::pull(int p, const Eigen::Vector3d& error, bool sideways, Ei
 }
 
 Motion project_frames(const Motion& motion, const std::vector<std::vector<Hold>>& holds, const Eigen::MatrixXd& floor,
-                      ShapeProjector& projector, double smooth_hz) {
+                      const Eigen::VectorXd& reach, ShapeProjector& projector, double smooth_hz) {
   Motion result = motion;
   for (int pass = 0; pass < 3; ++pass) {
     Motion change = motion;
     for (Eigen::Index f = 0; f < motion.count(); ++f) {
-      const Eigen::Matrix3Xd shape = projector.project(result.at(f), holds[static_cast<std::size_t>(f)], floor.col(f));
+      const Eigen::Matrix3Xd shape = projector.project(result.at(f), holds[static_cast<std::size_t>(f)], floor.col(f), reach[f]);
       change.at(f) = shape - motion.at(f);
     }
     change.travel.setZero();  // the change alone is smoothed; it does not travel with the loop

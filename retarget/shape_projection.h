@@ -1,6 +1,5 @@
 #pragma once
 
-#include <limits>
 #include <vector>
 
 #include "physics/stepper.h"
@@ -28,11 +27,10 @@ Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double cleara
 class ShapeProjector {
  public:
   /// length [m] is L. The scene must outlive the projector.
-  ShapeProjector(const physics::Scene& scene, double length, bool keep_volume,
-                 double reach = std::numeric_limits<double>::infinity());
+  ShapeProjector(const physics::Scene& scene, double length, bool keep_volume);
 
-  /// `floor` [m]: the least height of each contact point.
-  Eigen::Matrix3Xd project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor);
+  /// `floor` [m]: the least height of each contact point; `reach` [-] may be infinite.
+  Eigen::Matrix3Xd project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor, double reach);
 
  private:
   Eigen::Vector3d error_of(const Hold& hold, const Eigen::Matrix3Xd& x) const;
@@ -47,12 +45,12 @@ class ShapeProjector {
   physics::Body body_;
   physics::SystemMatrix matrix_;
   Eigen::VectorXd shape_;  // activation for which the animator's shape, as far as it is within reach, has no stress
-  double reach_, tether_ = 0, hold_ = 0;
+  double tether_ = 0, hold_ = 0;
 };
 
 /// Projects all frames, twice with what the projection changed smoothed over time at `smooth_hz`, then once more so that contacts
-/// hold.
+/// hold. `reach` F: see ShapeProjector.
 Motion project_frames(const Motion& motion, const std::vector<std::vector<Hold>>& holds, const Eigen::MatrixXd& floor,
-                      ShapeProjector& projector, double smooth_hz);
+                      const Eigen::VectorXd& reach, ShapeProjector& projector, double smooth_hz);
 
 }  // namespace hydrostat::retarget

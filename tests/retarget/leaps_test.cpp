@@ -91,6 +91,43 @@ TEST(ReachOut, WhatLandsComesDownEarlierOnItsPlace) {
   }
 }
 
+TEST(ProlongStances, EveryStanceLastsLongerAtBothEndsOnItsPlace) {
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto draw = [&](long from, long to) { return std::uniform_int_distribution<long>(from, to)(random); };
+    const long longer = draw(1, 3), lasts[] = {draw(4, 20), draw(4, 20)}, begin[] = {draw(0, kFrames - 1), draw(0, kFrames - 1)};
+    Leap after = leap(begin, lasts);
+    const Leap before = after;
+    prolong_stances(after.points, longer, after.contacts, after.holds);
+    for (std::size_t k = 0; k < 2; ++k) {
+      for (long f = 0; f < kFrames; ++f) {
+        const auto frame = static_cast<std::size_t>(f);
+        const long since = (f - begin[k] + kFrames) % kFrames;  // the stance's first frame is 0, those before it are at the period's end
+        EXPECT_EQ(after.contacts.state[k][frame], since < lasts[k] + longer || since >= kFrames - longer ? kStick : kOff) << k << " " << f;
+        EXPECT_EQ(after.contacts.touching(static_cast<Eigen::Index>(k), f), after.contacts.state[k][frame] == kStick);
+        const auto is_own = [&](const Hold& h) { return h.point == static_cast<int>(k); };
+        ASSERT_EQ(std::count_if(after.holds[frame].begin(), after.holds[frame].end(), is_own), after.contacts.state[k][frame] == kStick);
+        if (after.contacts.state[k][frame] != kStick || before.contacts.state[k][frame] == kStick) continue;
+        // The place of the stance's nearest frame, of the period before or after where the seam lies between.
+        const long nearest = since < lasts[k] + longer ? begin[k] + lasts[k] - 1 : begin[k];
+        const std::vector<Hold>& stood = before.holds[static_cast<std::size_t>(nearest % kFrames)];
+        const double travelled = f - nearest % kFrames > kFrames / 2 ? 1 : (nearest % kFrames - f > kFrames / 2 ? -1 : 0);
+        const Eigen::Vector3d moved = std::find_if(after.holds[frame].begin(), after.holds[frame].end(), is_own)->place - std::find_if(stood.begin(), stood.end(), is_own)->place;
+        EXPECT_LT((moved - Eigen::Vector3d(0, 0, travelled)).norm(), 1e-12) << k << " " << f;
+      }
+    }
+  }
+}
+
+TEST(ProlongStances, OfWhatIsPlayedOnceStayInsideTheClip) {
+  Leap after = leap({0, 20}, {10, 10}, false);
+  prolong_stances(after.points, 2, after.contacts, after.holds);
+  const auto frames_of = [&](std::size_t k) { return std::count(after.contacts.state[k].begin(), after.contacts.state[k].end(), kStick); };
+  EXPECT_EQ(frames_of(0), 12);
+  EXPECT_EQ(frames_of(1), 12);
+}
+
 TEST(ReachOut, WhoNeverFliesStandsAsBefore) {
   for (const long gap : {0L, 1L, 2L}) {  // both in the air: a flicker
     Leap after = leap({0, 15}, {15, 15 - gap});
@@ -131,11 +168,14 @@ TEST(GainOfLeaps, IsTheUsualOfWhatNeverFlies) {
   EXPECT_EQ(walk.root_weight, usual.root_weight);
   EXPECT_LT(hops.foot_weight, usual.foot_weight);
   EXPECT_LT(hops.root_weight, usual.root_weight);
+  EXPECT_GT(hops.effort, usual.effort) << "a hop that keeps itself up is not to be shaken";
+  EXPECT_EQ(walk.effort, usual.effort);
   EXPECT_TRUE(std::isinf(hops.long_step)) << "the next hop makes up for it";
   EXPECT_EQ(walk.long_step, usual.long_step);
   const CorrectorOptions jump = gain_of(leap({20, 20}, {10, 10}, false));
   EXPECT_LT(jump.foot_weight, usual.foot_weight);
   EXPECT_EQ(jump.root_weight, usual.root_weight) << "it has to stand where it lands";
+  EXPECT_EQ(jump.effort, usual.effort);
   EXPECT_EQ(jump.long_step, usual.long_step);
 }
 

@@ -162,6 +162,24 @@ TEST(Prepare, HoldsAShapeBackThatIsOutOfReach) {
   EXPECT_EQ(prepared(creature, stretched(1.2)).target.frames, prepared(creature, stretched(1.2), endless).target.frames);
 }
 
+TEST(Prepare, AFarLeapIsHeldBackLessWhereItIsClearOfTheGround) {
+  // Twice as long as at rest all the time; it hops by `rise` [m] in 0.3 s, in which free fall rises by 0.11 m.
+  const BoxCreature creature = make_box_creature();
+  const auto strain_above = [&](double rise, bool knows_leaps) {
+    const Motion motion = played(creature, 36, true, [rise](const Eigen::Vector3d& x, Eigen::Index f) {
+      const double height = f < 18 ? 0 : rise * std::pow(std::sin(M_PI * static_cast<double>(f - 18) / 18), 2);
+      return Eigen::Vector3d(2 * x.x(), x.y() + height, x.z());
+    });
+    PrepareOptions options;
+    options.momentum = knows_leaps;  // what no momentum is asked of is no leap
+    Motion still = prepared(creature, motion, options).target;
+    still.frames = still.frames.col(25).eval();
+    return needed_strain(creature.scene.body, still);
+  };
+  EXPECT_GT(strain_above(0.4, true), strain_above(0.4, false) + 0.01);
+  EXPECT_NEAR(strain_above(0, true), strain_above(0, false), 1e-3) << "what never flies";
+}
+
 TEST(Prepare, BalancesAHopThatNobodyCouldDo) {
   const BoxCreature creature = make_box_creature();
   PrepareOptions as_it_is;

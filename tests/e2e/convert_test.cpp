@@ -270,8 +270,8 @@ TEST(Convert, RedoesOnlyWhatAChangedOptionReaches) {
 TEST(Convert, MarksACreatureThatFalls) {
   const TemporaryDirectory directory;
   const fs::path creature = directory.path / "creature";
-  // A dog of five centimetres that stays in the air as long as a large one: it would have to leap over three times its length.
-  const std::string flea = std::string(kSmallOptions) + "--height 0.05";
+  // A dog of three centimetres that stays in the air as long as a large one: it would have to leap over five times its length.
+  const std::string flea = std::string(kSmallOptions) + "--height 0.03";
   convert(directory.path, kSmallClip, "creature", kSmallOptions);
   std::ofstream(creature / "replay.glb") << "of an earlier run that stayed up";
   std::ofstream(creature / "notes.txt") << "the user's own";

@@ -27,6 +27,7 @@ bool lands(const ContactSchedule& contacts, const std::vector<bool>& flying, std
   return false;
 }
 
+/// What touches and where it stands, before any stance is lengthened.
 struct Stances {
   ContactSchedule contacts;
   std::vector<std::vector<Hold>> holds;

@@ -12,7 +12,7 @@ namespace hydrostat::retarget {
 std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_hz, bool loop);
 
 /// Lets every stance last `frames` longer at both ends, as far as its patch was off the ground there, on the place on which it stands:
-/// what pushes off and lands over a longer time does so with less force, and flies the lower. `points` is the motion of the contact
+/// what pushes off later and lands earlier flies for a shorter time, and lower. `points` is the motion of the contact
 /// points, `holds` are find_holds' of `contacts`; both grow by those frames.
 void prolong_stances(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds);
 
@@ -31,8 +31,8 @@ bool has_flight(const PreparedTarget& plan);
 /// Feedback for a plan that flies; any other's is as it was. A foot that a landing shakes loose is wanted back on its place rather than
 /// under the body, so that the rows of feet in the air weigh an eighth. A loop has the next hop to make up for an error of momentum,
 /// and the moment of its push is too short to do so at once: these rows weigh half, no foot hastens to catch it, and muscles cost
-/// more: the plan's hop goes on by itself from body to body, and what feedback does in the few frames of a landing shakes it more than
-/// the landing does. What is played once has to stand where it lands.
+/// more: a frog's hop that keeps itself up without feedback falls on more bodies with the usual gain (measured, +-10 %). What is played
+/// once has to stand where it lands.
 CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOptions& options);
 
 }  // namespace hydrostat::retarget

@@ -19,14 +19,14 @@ namespace {
 
 constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
-constexpr double kOverReach = 4.0 / 3;   // times reach: what a clip needs beyond that is held back
+constexpr double kOverReach = 4.0 / 3; // times reach: what a clip needs beyond that is held back
 constexpr double kFar = 0.04;         // of L: further no shift should move a clip
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
 constexpr ShiftCosts kLeapCosts{0.1, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
 constexpr double kReachOut = 1.0 / 60;  // [s] that its feet come down still earlier
-constexpr double kReachInFlight = 0.05; // strain that its shape is held back less where nothing bears,
+constexpr double kReachInFlight = 0.05;  // strain that its shape is held back less where nothing bears,
 constexpr double kClearOfGround[] = {1.0 / 60, 0.1};  // [s] from the last contact on and until so long before the next
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
 

@@ -52,7 +52,7 @@ void Corrector::find_free_deviation(const physics::State& state, const physics::
 
 /// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration. Returns how far all six are off,
 /// in speeds per sqrt(g L).
-double Corrector::weigh_momentum(const physics::State& state, double grip) {
+double Corrector::weigh_momentum(const physics::State& state, const ContactNow& contact) {
   const physics::Body& body = scene_.body;
   const int nodes = body.node_count();
   const double mass = body.mass.sum();
@@ -68,7 +68,8 @@ double Corrector::weigh_momentum(const physics::State& state, double grip) {
     rows.block<3, 3>(0, 3 * i).diagonal().setConstant(body.mass[i] / mass);
     rows.block<3, 3>(3, 3 * i) = gyration * body.mass[i] * inverse_inertia * cross;
   }
-  for (const int row : {0, 2, 4}) rows.row(row) *= grip;
+  for (const int row : {0, 2, 4}) rows.row(row) *= contact.grip;
+  for (const int row : {3, 5}) rows.row(row) *= contact.upright;
   rows *= options_.root_weight / speed_unit_;
   weighted_.topLeftCorner(6, responses_.velocities().cols()).noalias() = rows * responses_.velocities();
   weighted_.topRightCorner<6, 1>().noalias() = rows * deviation_;
@@ -152,7 +153,7 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   cone_rows(scene_, contact.touching, held_to_cones(contact), contact.force / weight,
             (contact_stiffness_ * options_.horizon_s / weight) * responses_.velocities(), previous_, cones_);
   deviation_ += (state.x - reference.x).reshaped() / options_.settle_s;
-  momentum_error_ = weigh_momentum(state, contact.grip);
+  momentum_error_ = weigh_momentum(state, contact);
 
   normal_.setZero(muscles + 1, muscles + 1);
   normal_.selfadjointView<Eigen::Lower>().rankUpdate(weighted_.transpose());

@@ -36,6 +36,7 @@ struct ContactNow {
   std::vector<Eigen::Vector3d> lead;   // [m] of each of them: by how much what lies ahead moves it from its reference; empty: not
   double grip = 1;  // in [0, 1], weighs the rows of horizontal momentum: where contacts are meant to slide,
                     // friction sets the ground's sideways force, and pushing harder only slips more
+  double upright = 1;  // in [0, 1], weighs the rows of pitch and roll
 };
 
 /// Feedback on the muscles in deviation form: nothing on the nominal path.
@@ -68,7 +69,7 @@ class Corrector {
 
  private:
   void find_free_deviation(const physics::State& state, const physics::State& reference);
-  double weigh_momentum(const physics::State& state, double grip);
+  double weigh_momentum(const physics::State& state, const ContactNow& contact);
   void find_step(const physics::State& state, const physics::State& reference);
   void weigh_feet(const physics::State& state, const physics::State& reference, const ContactNow& contact);
   std::vector<bool> held_to_cones(const ContactNow& contact) const;

@@ -12,6 +12,8 @@ namespace {
 constexpr double kPushOff = 0.1;                    // [s] before a flight
 constexpr double kAlong = 2, kAside = 0.4;          // [1/s] of an error of place
 constexpr double kMostAlong = 1, kMostAside = 0.5;  // [1/s] of L
+constexpr double kTurn = 5, kMostTurn = 3;          // [1/s] of an error of heading, [rad/s]
+constexpr double kUpright = 0.2;                     // of the usual weight
 constexpr double kLeastStride = 0.02;               // of L: less is no way
 
 Eigen::Vector3d at_most(const Eigen::Vector3d& v, double most) { return v * (most / std::max(v.norm(), most)); }
@@ -42,12 +44,21 @@ void LeapFeedback::end_cycle(const WayError& error) {
   lead_ = -at_most(kAlong * along, kMostAlong * length_) - at_most(kAside * (place - along), kMostAside * length_);
 }
 
-void LeapFeedback::apply(double time_s, double yaw, physics::State& reference) const {
-  if (!is_needed() || lead_.isZero(0)) return;
+bool LeapFeedback::pushes_off(double time_s) const {
+  if (!is_needed()) return false;
   const double cycle = std::floor(time_s / period_s_ + 1e-9);
   const auto frame = static_cast<std::size_t>(std::max(0.0, (time_s - cycle * period_s_) * rate_hz_ + 1e-6));
-  if (!pushes_off_[std::min(frame, pushes_off_.size() - 1)]) return;
-  reference.v.colwise() += Eigen::AngleAxisd(yaw + cycle * yaw_, Eigen::Vector3d::UnitY()) * lead_;
+  return pushes_off_[std::min(frame, pushes_off_.size() - 1)];
+}
+
+double LeapFeedback::upright(double time_s) const { return pushes_off(time_s) ? kUpright : 1; }
+
+void LeapFeedback::apply(double time_s, double yaw, double turn, const Eigen::Vector3d& com, physics::State& reference) const {
+  if (!pushes_off(time_s)) return;
+  const double cycle = std::floor(time_s / period_s_ + 1e-9);
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitY(), lead = Eigen::AngleAxisd(yaw + cycle * yaw_, up) * lead_;
+  const Eigen::Vector3d spin = std::clamp(-kTurn * turn, -kMostTurn, kMostTurn) * up;
+  for (Eigen::Index i = 0; i < reference.v.cols(); ++i) reference.v.col(i) += lead + spin.cross(reference.x.col(i) - com);
 }
 
 }  // namespace hydrostat::retarget

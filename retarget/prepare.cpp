@@ -26,7 +26,7 @@ constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of co
 constexpr ShiftCosts kLeapCosts{0.1, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
 constexpr double kReachOut = 1.0 / 60;  // [s] that its feet come down still earlier
-constexpr double kReachInFlight = 0.05;  // strain that its shape is held back less where nothing bears,
+constexpr double kReachInFlight = 0.065;  // strain that its shape is held back less where nothing bears,
 constexpr double kClearOfGround[] = {1.0 / 60, 0.1};  // [s] from the last contact on and until so long before the next
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
 

@@ -253,7 +253,8 @@ void Run::control() {
   stride_.follow(fit_, control_s_);
   if (brace_) brace_->follow(fit_, time_s_, control_s_);
   keep_way();
-  leap_.apply(time_s_, glide_.yaw, glided_);
+  leap_.apply(time_s_, glide_.yaw, yaw_of(fit_.rotation), physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
+  contact_.upright = leap_.upright(time_s_);
   planned_.look(time_s_, options_.corrector.horizon_s, uneven_.has_value(), contact_);
   if (uneven_) {
     uneven_->look(time_s_, control_s_, fit_, seen);

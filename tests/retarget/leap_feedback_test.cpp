@@ -31,7 +31,7 @@ PreparedTarget hopping(double stride = 2 * kLength, double yaw = 0, bool loop = 
 /// What the reference's velocity changes by at a time.
 Eigen::Vector3d lead_at(const LeapFeedback& feedback, double time_s, double yaw = 0) {
   physics::State reference{Eigen::Matrix3Xd::Zero(3, 4), Eigen::Matrix3Xd::Zero(3, 4)};
-  feedback.apply(time_s, yaw, reference);
+  feedback.apply(time_s, yaw, 0, Eigen::Vector3d::Zero(), reference);
   EXPECT_TRUE(reference.x.isZero(0));
   EXPECT_TRUE(reference.v.isApprox(reference.v.col(0).replicate(1, 4)) || reference.v.isZero(0));
   return reference.v.col(0);
@@ -90,6 +90,39 @@ TEST(LeapFeedback, ALeapOnTheSpotIsHeldThereAlikeToAllSides) {
   for (const double angle : {0.0, 1.0, 2.5}) {
     feedback.end_cycle(WayError(0, 0.05 * std::cos(angle), 0.05 * std::sin(angle)));
     EXPECT_LT((feedback.lead() + 0.4 * 0.05 * Eigen::Vector3d(std::cos(angle), 0, std::sin(angle))).norm(), 1e-12);
+  }
+}
+
+TEST(LeapFeedback, TurnsTheReferenceBackToItsWayAboutItsCentreWhileThePushOffLasts) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> draw(-1, 1);
+    const PreparedTarget plan = hopping();
+    const LeapFeedback feedback(plan, kLength);
+    physics::State reference{Eigen::Matrix3Xd::NullaryExpr(3, 5, [&] { return draw(random); }), Eigen::Matrix3Xd::Zero(3, 5)};
+    const Eigen::Matrix3Xd places = reference.x;
+    const Eigen::Vector3d com(draw(random), draw(random), draw(random));
+    const double turn = 2 * draw(random), spin = -std::clamp(5 * turn, -3.0, 3.0);
+    feedback.apply((kTakeOff + 0.5) / kFrames, 0, turn, com, reference);
+    EXPECT_TRUE(reference.v.isZero(0)) << "in flight";
+    feedback.apply((kTakeOff - 0.5) / kFrames, 0, turn, com, reference);
+    EXPECT_EQ(reference.x, places);
+    for (int i = 0; i < 5; ++i) {
+      const Eigen::Vector3d arm = places.col(i) - com;
+      EXPECT_LT((reference.v.col(i) - spin * Eigen::Vector3d(arm.z(), 0, -arm.x())).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(LeapFeedback, HardlyCorrectsPitchAndRollWhileThePushOffLasts) {
+  const PreparedTarget plan = hopping(), standing_still = hopping(1, 0, true, false);
+  const LeapFeedback feedback(plan, kLength), none(standing_still, kLength);
+  for (long f = 0; f < 3 * kFrames; ++f) {
+    const double time_s = (static_cast<double>(f) + 0.5) / kFrames;
+    const bool pushes_off = f % kFrames >= kTakeOff - 6 && f % kFrames < kTakeOff;
+    EXPECT_EQ(feedback.upright(time_s), pushes_off ? 0.2 : 1) << "frame " << f;
+    EXPECT_EQ(none.upright(time_s), 1);
   }
 }
 

@@ -50,8 +50,8 @@ void Corrector::find_free_deviation(const physics::State& state, const physics::
   responses_.solve_in_place(deviation_);
 }
 
-/// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration. Returns how far all six are off,
-/// in speeds per sqrt(g L).
+/// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration. Returns how far all six are off, as
+/// far as `contact` weighs them, in speeds per sqrt(g L).
 double Corrector::weigh_momentum(const physics::State& state, const ContactNow& contact) {
   const physics::Body& body = scene_.body;
   const int nodes = body.node_count();

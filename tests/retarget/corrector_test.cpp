@@ -137,6 +137,30 @@ TEST(Corrector, PushesBackAgainstAnErrorOfPlace) {
   }
 }
 
+TEST(Corrector, LeavesPitchAndRollAloneWhereTheyWeighNothingButNoOtherTurn) {
+  const Controlled controlled;
+  CorrectorOptions options;
+  options.node_weight = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    SCOPED_TRACE("axis " + std::to_string(axis));
+    physics::State state = controlled.rest;
+    const Eigen::Vector3d com = physics::centre_of_mass(controlled.creature.scene.body, state.x);
+    for (Eigen::Index i = 0; i < state.x.cols(); ++i) state.v.col(i) = Eigen::Vector3d::Unit(axis).cross(state.x.col(i) - com);
+    double effort[2];
+    for (const int upright : {0, 1}) {
+      ContactNow contact = controlled.standing;
+      contact.upright = upright;
+      Corrector corrector = controlled.corrector(options);
+      Eigen::VectorXd activation = controlled.passive;
+      effort[upright] = corrector.correct(state, controlled.rest, contact, activation);
+    }
+    ASSERT_GT(effort[1], 0);
+    // Of pitch and roll the centre of mass's own rows still see a part.
+    if (axis == 1) EXPECT_NEAR(effort[0] / effort[1], 1, 1e-3);
+    else EXPECT_LT(effort[0] / effort[1], 0.6);
+  }
+}
+
 TEST(Corrector, CannotMoveTheCentreOfMassInTheAir) {
   // Activations are internal: in flight the momentum rows see no muscle, so an error of the whole body's velocity makes none work.
   const Controlled controlled;

@@ -9,7 +9,7 @@ namespace hydrostat::io {
 namespace {
 
 constexpr const char* kTargetTitle = "hydrostat.target";
-constexpr const char* kTargetVersion = "3";
+constexpr const char* kTargetVersion = "4";
 constexpr const char* kRigTitle = "hydrostat.rig";
 constexpr const char* kRigVersion = "1";
 constexpr const char* kAppearanceTitle = "hydrostat.appearance";
@@ -186,7 +186,7 @@ void name_fields(RecordArchive& archive, retarget::PreparationReport& report) {
 
 void name_fields(RecordArchive& archive, retarget::PreparedTarget& prepared) {
   archive.fields("target", prepared.target, "contacts", prepared.contacts, "missing_wrench", prepared.missing_wrench,
-                 "mass_shares", prepared.mass_shares, "report", prepared.report, "warnings", prepared.warnings);
+                 "mass_shares", prepared.mass_shares, "support_friction", prepared.support_friction, "report", prepared.report, "warnings", prepared.warnings);
 }
 
 void name_fields(RecordArchive& archive, retarget::InverseReport& report) {

@@ -131,7 +131,7 @@ Frame make_frame(const Dynamics& dynamics, Eigen::Index f, const InverseOptions&
   const int nodes = body.node_count(), edges = body.edge_count();
   Frame frame;
   frame.generators =
-      contact_generators(dynamics.prepared.contacts, f, dynamics.scene.ground.friction, options.support_friction);
+      contact_generators(dynamics.prepared.contacts, f, dynamics.scene.ground.friction, dynamics.prepared.support_friction);
   frame.kinematic = kinematic_activation(body, dynamics.prepared.target.at(f), options.limit);
   const int forces = static_cast<int>(frame.generators.size()), columns = 3 * nodes + edges + forces;
   BoundedLeastSquares& problem = frame.problem;

@@ -10,7 +10,6 @@ struct InverseOptions {
   double shape_weight = 0.1;      // eps: per (activation - kinematic activation)^2, mean over constraints, in (mm per m of L)^2
   double smooth_weight = 0.3;     // eps_s: per second difference squared, likewise
   int sweeps = 3;                  // over the frames, for the smoothness term
-  double support_friction = 0.7;   // of the ground's friction that the contact forces may use, as in the preparation
   int threads = 2;
 };
 

@@ -24,6 +24,7 @@ constexpr double kFar = 0.04;         // of L: further no shift should move a cl
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
 constexpr ShiftCosts kLeapCosts{0.1, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
+constexpr double kLeapFriction = 1.05;  // times the usual share of friction: it is moved less
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
 constexpr double kReachOut = 1.0 / 60;  // [s] that its feet come down still earlier
 constexpr double kReachInFlight = 0.065;  // strain that its shape is held back less where nothing bears,
@@ -171,6 +172,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   ContactSchedule& contacts = result.contacts;
   Motion& target = result.target;
   target = smooth(coupled, options.smooth_hz);
+  result.support_friction = options.support_friction;
   report.smooth_shift_rms_length = rms_difference(target, coupled, body.mass) / length;
 
   Motion points = point_motion(scene.contact_points, coupled);
@@ -198,6 +200,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   mark();
   if (options.momentum) is_far_leap = leaps_far(target, scene, contacts, length, options.support_friction);
   if (is_far_leap) {
+    result.support_friction *= kLeapFriction;
     prolong_stances(points, std::lround(kLonger * points.rate_hz), contacts, holds);
     reach_out(points, std::max(1L, std::lround(kReachOut * points.rate_hz)), contacts, holds);
     set_feet();
@@ -208,7 +211,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   const Motion before_momentum = target;
   Motion wanted = locked;  // the animator's shape with the shifts so far
   for (int round = 0; options.momentum && round < options.rounds; ++round) {
-    const Shift shift = find_shift(target, scene, contacts, length, options.support_friction, 60, is_far_leap ? kLeapCosts : ShiftCosts());
+    const Shift shift = find_shift(target, scene, contacts, length, result.support_friction, 60, is_far_leap ? kLeapCosts : ShiftCosts());
     wanted = shifted(wanted, shift, body);
     target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
     fall_freely(contacts, scene, target);
@@ -216,7 +219,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   }
   report.momentum_shift_rms_length = rms_difference(target, before_momentum, body.mass) / length;
   report.total_shift_rms_length = rms_difference(target, grounded, body.mass) / length;
-  result.missing_wrench = missing_wrench(target, scene, contacts, length, options.support_friction);
+  result.missing_wrench = missing_wrench(target, scene, contacts, length, result.support_friction);
   measure(result, body, report);
   return result;
 }

@@ -8,7 +8,7 @@ namespace hydrostat::retarget {
 
 struct PrepareOptions {
   double smooth_hz = 10;         // cut-off of the smoothing (half amplitude)
-  double support_friction = 0.7; // of the ground's friction that the plan may use
+  double support_friction = 0.7; // of the ground's friction that the plan may use; 5 % more in a far leap
   int rounds = 3;                // of volume and momentum
   double clearance = 0.015;      // per D: what is not in contact stays that far above the ground, fading towards contacts
   int clearance_frames = 4;      // over which it fades
@@ -25,6 +25,7 @@ struct PreparedTarget {
   Eigen::VectorXd mass_shares;     // N, in (0, 1]: what of their mass the nodes keep so that the body stands; none: all
   PreparationReport report;
   std::vector<std::string> warnings;
+  double support_friction = 0.7;   // of the ground's friction that it uses
 };
 
 /// Smooths, locks feet, restores volume and shifts the centre of mass and turns the trunk until gravity, contact forces inside

@@ -77,6 +77,7 @@ class Run {
   NominalPathCurve path_;
   const std::unique_ptr<physics::Stepper> stepper_;
   const std::vector<std::unique_ptr<physics::EffectOf<3>>> effects_;
+  const CorrectorOptions gain_;
   Corrector corrector_;
   Observer observer_;
   StateEstimate estimate_;
@@ -124,7 +125,8 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       path_(path_of(input)),
       stepper_(physics::make_stepper(options.method, plant_)),
       effects_(physics::plan_effects(plant_)),
-      corrector_(input.model, input.muscles, input.length, input.limit, gain_of_leaps(input.prepared, gain_on_path(input, options.corrector))),
+      gain_(gain_of_leaps(input.prepared, gain_on_path(input, options.corrector))),
+      corrector_(input.model, input.muscles, input.length, input.limit, gain_),
       observer_(options.observation, control_s_),
       estimate_(options.observation, control_s_, input.scene.gravity.norm()),
       glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
@@ -255,7 +257,7 @@ void Run::control() {
   keep_way();
   leap_.apply(time_s_, glide_.yaw, yaw_of(fit_.rotation), physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
   contact_.upright = leap_.upright(time_s_);
-  planned_.look(time_s_, options_.corrector.horizon_s, uneven_.has_value(), contact_);
+  planned_.look(time_s_, gain_.horizon_s, uneven_.has_value(), contact_);
   if (uneven_) {
     uneven_->look(time_s_, control_s_, fit_, seen);
     uneven_->lead(contact_.in_air, seen, glided_, options_.corrector.foot_settle_s, contact_.lead);

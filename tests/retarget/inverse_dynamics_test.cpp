@@ -93,6 +93,28 @@ TEST(InverseDynamics, KeepTheirBoundsExactly) {
   EXPECT_EQ(inverse.report.limit, 0.05);
 }
 
+TEST(InverseDynamics, UseTheShareOfFrictionThatTheirPlanDoes) {
+  // It stands on a slope of 27 degrees, which takes half of its weight's force sideways.
+  BoxCreature creature = make_box_creature();
+  creature.scene.gravity = {0.5 * 9.81, -9.81, 0};
+  const double friction = creature.scene.ground.friction;
+  for (const double needed : {0.6, 0.8, 1.2, 1.5}) {
+    SCOPED_TRACE(needed);
+    PreparedTarget plan = as_prepared(standing(creature, 3), always_standing(creature, 3));
+    plan.support_friction = 0.5 / friction * needed;
+    const InverseDynamics inverse = solve_inverse_dynamics(plan, creature.scene, kLength, {});
+    for (int p = 0; p < creature.scene.contact_points.count(); ++p) {
+      const Eigen::Vector3d force = inverse.contact_force.col(1).segment<3>(3 * p);
+      EXPECT_LE(std::hypot(force.x(), force.z()), plan.support_friction * friction * force.y() + 1e-9);
+    }
+    if (needed < 1) {
+      EXPECT_GT(inverse.report.root_residual_mg, 0.3 * (1 - needed));
+    } else {
+      EXPECT_LT(inverse.report.root_residual_mg, 0.02);
+    }
+  }
+}
+
 TEST(InverseDynamics, DoNotHangOnTheNumberOfThreads) {
   const BoxCreature creature = make_box_creature();
   const Motion motion = bobbing(creature, 5, 0.05);

@@ -170,12 +170,18 @@ TEST(GainOfLeaps, IsTheUsualOfWhatNeverFlies) {
   EXPECT_LT(hops.root_weight, usual.root_weight);
   EXPECT_GT(hops.effort, usual.effort) << "a hop that keeps itself up is not to be shaken";
   EXPECT_EQ(walk.effort, usual.effort);
+  EXPECT_GT(hops.node_weight, usual.node_weight);
+  EXPECT_EQ(walk.node_weight, usual.node_weight);
+  EXPECT_GT(hops.horizon_s, usual.horizon_s);
+  EXPECT_EQ(walk.horizon_s, usual.horizon_s);
   EXPECT_TRUE(std::isinf(hops.long_step)) << "the next hop makes up for it";
   EXPECT_EQ(walk.long_step, usual.long_step);
   const CorrectorOptions jump = gain_of(leap({20, 20}, {10, 10}, false));
   EXPECT_LT(jump.foot_weight, usual.foot_weight);
   EXPECT_EQ(jump.root_weight, usual.root_weight) << "it has to stand where it lands";
   EXPECT_EQ(jump.effort, usual.effort);
+  EXPECT_EQ(jump.node_weight, usual.node_weight);
+  EXPECT_EQ(jump.horizon_s, usual.horizon_s);
   EXPECT_EQ(jump.long_step, usual.long_step);
 }
 

@@ -162,22 +162,30 @@ TEST(Prepare, HoldsAShapeBackThatIsOutOfReach) {
   EXPECT_EQ(prepared(creature, stretched(1.2)).target.frames, prepared(creature, stretched(1.2), endless).target.frames);
 }
 
-TEST(Prepare, AFarLeapIsHeldBackLessWhereItIsClearOfTheGround) {
-  // Twice as long as at rest all the time; it hops by `rise` [m] in 0.3 s, in which free fall rises by 0.11 m.
+/// Twice as long as at rest all the time; it hops by `rise` [m] in 0.3 s, in which free fall rises by 0.11 m.
+PreparedTarget long_and_leaping(const BoxCreature& creature, double rise, const PrepareOptions& options) {
+  return prepared(creature, played(creature, 36, true, [rise](const Eigen::Vector3d& x, Eigen::Index f) {
+                    const double height = f < 18 ? 0 : rise * std::pow(std::sin(M_PI * static_cast<double>(f - 18) / 18), 2);
+                    return Eigen::Vector3d(2 * x.x(), x.y() + height, x.z());
+                  }), options);
+}
+
+TEST(Prepare, AFarLeapIsHeldBackLessWhereItIsClearOfTheGroundAndUsesMoreFriction) {
   const BoxCreature creature = make_box_creature();
-  const auto strain_above = [&](double rise, bool knows_leaps) {
-    const Motion motion = played(creature, 36, true, [rise](const Eigen::Vector3d& x, Eigen::Index f) {
-      const double height = f < 18 ? 0 : rise * std::pow(std::sin(M_PI * static_cast<double>(f - 18) / 18), 2);
-      return Eigen::Vector3d(2 * x.x(), x.y() + height, x.z());
-    });
-    PrepareOptions options;
-    options.momentum = knows_leaps;  // what no momentum is asked of is no leap
-    Motion still = prepared(creature, motion, options).target;
+  PrepareOptions usual, no_leaps;
+  no_leaps.momentum = false;  // what no momentum is asked of is no leap
+  const auto strain_above = [&](const PreparedTarget& plan) {
+    Motion still = plan.target;
     still.frames = still.frames.col(25).eval();
     return needed_strain(creature.scene.body, still);
   };
-  EXPECT_GT(strain_above(0.4, true), strain_above(0.4, false) + 0.01);
-  EXPECT_NEAR(strain_above(0, true), strain_above(0, false), 1e-3) << "what never flies";
+  const PreparedTarget leap = long_and_leaping(creature, 0.4, usual), none = long_and_leaping(creature, 0.4, no_leaps);
+  EXPECT_GT(strain_above(leap), strain_above(none) + 0.01);
+  EXPECT_NEAR(leap.support_friction, 1.05 * usual.support_friction, 1e-12);
+  EXPECT_EQ(none.support_friction, usual.support_friction);
+  const PreparedTarget grounded = long_and_leaping(creature, 0, usual);
+  EXPECT_NEAR(strain_above(grounded), strain_above(long_and_leaping(creature, 0, no_leaps)), 1e-3) << "what never flies";
+  EXPECT_EQ(grounded.support_friction, usual.support_friction);
 }
 
 TEST(Prepare, BalancesAHopThatNobodyCouldDo) {

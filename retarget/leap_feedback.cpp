@@ -44,10 +44,11 @@ void LeapFeedback::end_cycle(const WayError& error) {
   lead_ = -at_most(kAlong * along, kMostAlong * length_) - at_most(kAside * (place - along), kMostAside * length_);
 }
 
+double LeapFeedback::cycle_at(double time_s) const { return std::floor(time_s / period_s_ + 1e-9); }
+
 bool LeapFeedback::pushes_off(double time_s) const {
   if (!is_needed()) return false;
-  const double cycle = std::floor(time_s / period_s_ + 1e-9);
-  const auto frame = static_cast<std::size_t>(std::max(0.0, (time_s - cycle * period_s_) * rate_hz_ + 1e-6));
+  const auto frame = static_cast<std::size_t>(std::max(0.0, (time_s - cycle_at(time_s) * period_s_) * rate_hz_ + 1e-6));
   return pushes_off_[std::min(frame, pushes_off_.size() - 1)];
 }
 
@@ -55,8 +56,7 @@ double LeapFeedback::upright(double time_s) const { return pushes_off(time_s) ? 
 
 void LeapFeedback::apply(double time_s, double yaw, double turn, const Eigen::Vector3d& com, physics::State& reference) const {
   if (!pushes_off(time_s)) return;
-  const double cycle = std::floor(time_s / period_s_ + 1e-9);
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitY(), lead = Eigen::AngleAxisd(yaw + cycle * yaw_, up) * lead_;
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitY(), lead = Eigen::AngleAxisd(yaw + cycle_at(time_s) * yaw_, up) * lead_;
   const Eigen::Vector3d spin = std::clamp(-kTurn * turn, -kMostTurn, kMostTurn) * up;
   for (Eigen::Index i = 0; i < reference.v.cols(); ++i) reference.v.col(i) += lead + spin.cross(reference.x.col(i) - com);
 }

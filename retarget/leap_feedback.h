@@ -32,6 +32,7 @@ class LeapFeedback {
   const Eigen::Vector3d& lead() const { return lead_; }  // [m/s], as seen where the target begins
 
  private:
+  double cycle_at(double time_s) const;
   bool pushes_off(double time_s) const;
 
   const double length_, period_s_, rate_hz_, yaw_;  // yaw_: of the target in a cycle [rad]

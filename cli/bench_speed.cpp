@@ -148,11 +148,10 @@ SpeedRow measure(const SpeedCommand& command, const retarget::Character& charact
   row.preparation_ms = ms_of(prepared, [&] { return prepared_target(creature, motion); });
   retarget::lighten(prepared, creature.scene.body);
   retarget::InverseOptions inverse_options;
-  inverse_options.limit = retarget::automatic_limit(creature.scene.body, prepared.target);
   inverse_options.threads = 1;
   retarget::InverseDynamics inverse;
   row.inverse_ms = ms_of(inverse, [&] {
-    return retarget::solve_inverse_dynamics(prepared, creature.scene, creature.length, inverse_options);
+    return retarget::solve_within_automatic_limit(prepared, creature.scene, creature.length, inverse_options);
   });
   const retarget::Performer performer = make_performer(creature, motion, std::move(prepared));
   retarget::SignalSet signals;

@@ -90,15 +90,16 @@ void Conversion::find_activations(double wished_limit) {
   retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_); });
   retarget::lighten(prepared, creature_.scene.body);
   retarget::InverseOptions inverse_options;
-  inverse_options.limit = wished_limit > 0 ? wished_limit : retarget::automatic_limit(scene.body, prepared.target);
+  inverse_options.limit = wished_limit;
   inverse_options.threads = options_.threads;
-  key_ = key_after(key_, inverse_options.limit);
+  key_ = key_after(key_, wished_limit);
   inverse_ = stages_.run("inverse_dynamics", key_, [&] {
-    return retarget::solve_inverse_dynamics(prepared, scene, creature_.length, inverse_options);
+    const auto& solve = wished_limit > 0 ? retarget::solve_inverse_dynamics : retarget::solve_within_automatic_limit;
+    return solve(prepared, scene, creature_.length, inverse_options);
   });
   add_warnings(prepared.warnings);
   warn_of_flights(prepared);
-  add_warnings(retarget::target_warnings(prepared, scene.body, inverse_options.limit, wished_limit == 0));
+  add_warnings(retarget::target_warnings(prepared, scene.body, inverse_.report.limit, wished_limit == 0));
   add_warnings(retarget::inverse_warnings(inverse_.report));
   target_.performer = make_performer(creature_, motion_, std::move(prepared));
   plan_wobble();

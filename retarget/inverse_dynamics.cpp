@@ -17,6 +17,10 @@ constexpr double kTie = 10;  // weight of the rows that tie y to the residual fo
 constexpr int kFirstRounds = 6,
               kLaterRounds = 1;         // of linearising the forces of elements, in the first sweep and in those after it
 constexpr double kSettled = 0.01;       // change of an activation that ends the rounds
+constexpr double kLeastLimit = 0.1, kMostLimit = 0.4;  // of |activation - 1|, where it is chosen
+constexpr double kShapeShare = 0.99;    // of the target's strains that the limit holds,
+constexpr double kMostHeld = 0.03;      // share of the activations that it may hold
+constexpr double kWiden = 1.5;          // times as wide where it holds more
 constexpr double kForceWeight = 0.1;    // per contact force in m g, in mm per m of L: makes the split of loads unique
 
 /// Everything about one frame that does not change from sweep to sweep.
@@ -192,9 +196,9 @@ double automatic_limit(const physics::Body& body, const Motion& target) {
     const Eigen::VectorXd u = kinematic_activation(body, target.at(f), 10);
     for (const double strain : u) strains.push_back(std::abs(strain));
   }
-  const auto place = strains.begin() + static_cast<long>(0.99 * static_cast<double>(strains.size() - 1));
+  const auto place = strains.begin() + static_cast<long>(kShapeShare * static_cast<double>(strains.size() - 1));
   std::nth_element(strains.begin(), place, strains.end());
-  return std::clamp(*place, 0.1, 0.4);
+  return std::clamp(*place, kLeastLimit, kMostLimit);
 }
 
 InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const physics::Scene& scene, double length,
@@ -286,6 +290,17 @@ InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const phy
   result.report.max_strain = strains.back();
   result.report.p95_strain = strains[static_cast<std::size_t>(0.95 * static_cast<double>(strains.size() - 1))];
   return result;
+}
+
+InverseDynamics solve_within_automatic_limit(const PreparedTarget& prepared, const physics::Scene& scene, double length,
+                                             const InverseOptions& options) {
+  InverseOptions within = options;
+  within.limit = automatic_limit(scene.body, prepared.target);
+  for (;;) {
+    InverseDynamics inverse = solve_inverse_dynamics(prepared, scene, length, within);
+    if (inverse.report.saturated <= kMostHeld || within.limit >= kMostLimit) return inverse;
+    within.limit = std::min(kMostLimit, kWiden * within.limit);
+  }
 }
 
 }  // namespace hydrostat::retarget

@@ -47,10 +47,7 @@ class Ablation : public testing::Test {
         retarget::prepare(motion_->nodes, retarget::preparation_scene(creature), retarget::bones_of(creature.contacts),
                           creature.character.skeleton.names, creature.mesh.bone_weights, creature.length, creature.size, options);
     retarget::find_legs(creature.character.skeleton, prepared.contacts);
-    retarget::InverseOptions inverse_options;
-    inverse_options.limit = retarget::automatic_limit(creature.scene.body, prepared.target);
-    const retarget::InverseDynamics inverse =
-        retarget::solve_inverse_dynamics(prepared, creature.scene, creature.length, inverse_options);
+    const retarget::InverseDynamics inverse = retarget::solve_within_automatic_limit(prepared, creature.scene, creature.length, {});
     const retarget::Performer performer = cli::make_performer(creature, *motion_, std::move(prepared));
     retarget::PerformOptions go;
     go.replay.duration_s = cycles * performer.prepared.target.duration_s();

@@ -270,5 +270,32 @@ TEST(AutomaticLimit, IsThe99thPercentileWithinItsBounds) {
   EXPECT_LE(between, 0.2 + 1e-12);
 }
 
+TEST(AutomaticLimit, IsWidenedByHalvesOnlyWhereLoadsHoldMoreThanThreePercentAtIt) {
+  int widened = 0;
+  for (const double softer : {1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0}) {
+    BoxCreature creature = make_box_creature();
+    creature.scene.body.edge_stiffness /= softer;
+    const PreparedTarget plan = as_prepared(standing(creature, 3), always_standing(creature, 3));
+    const double least = automatic_limit(creature.scene.body, plan.target);
+    InverseOptions narrow;
+    narrow.limit = least;
+    const InverseDynamics at_first = solve_inverse_dynamics(plan, creature.scene, kLength, narrow);
+    const InverseDynamics found = solve_within_automatic_limit(plan, creature.scene, kLength, {});
+    SCOPED_TRACE("softer " + std::to_string(softer) + ", held " + std::to_string(at_first.report.saturated));
+    if (at_first.report.saturated <= 0.03) {
+      EXPECT_EQ(found.report.limit, least);
+      EXPECT_EQ(found.activation, at_first.activation);
+      continue;
+    }
+    ++widened;
+    EXPECT_GE(found.report.limit, 1.5 * least - 1e-12);
+    EXPECT_LE(found.report.limit, 0.4);
+    EXPECT_TRUE(found.report.saturated <= 0.03 || found.report.limit == 0.4) << found.report.saturated;
+    EXPECT_LT(found.report.miss_rms_length, at_first.report.miss_rms_length);
+  }
+  EXPECT_GT(widened, 0);
+  EXPECT_LT(widened, 7);
+}
+
 }  // namespace
 }  // namespace hydrostat::retarget::inverse_dynamics_test

@@ -8,7 +8,7 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kCrawlingEffort = 100;  // times as much
+constexpr double kCrawlingEffort = 20;  // times as much
 
 /// It bears itself by its trunk alone, and that slides.
 bool crawls(const ContactSchedule& contacts) {

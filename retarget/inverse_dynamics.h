@@ -33,9 +33,9 @@ double automatic_limit(const physics::Body& body, const Motion& target);
 InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const physics::Scene& scene, double length,
                                        const InverseOptions& options);
 
-/// The same within the automatic limit, and where that holds more than 3 % of the activations within one half as wide again, until it
-/// holds fewer or is 0.4: what a limb needs to bear its load comes on top of what its shape needs, and the thinner it is the more. The
-/// limit of `options` counts for nothing; the report has the one that was taken.
+/// Solves the same within the automatic limit, and again within one half as wide again while more than 3 % of the activations are held
+/// at it and it is below 0.4: what a limb needs to bear its load comes on top of what its shape needs, and the more the thinner it is.
+/// The limit of `options` is not read; the report has the one that was taken.
 InverseDynamics solve_within_automatic_limit(const PreparedTarget& prepared, const physics::Scene& scene, double length,
                                              const InverseOptions& options);
 

@@ -260,9 +260,9 @@ class Bench {
     retarget::AccuracyRow row = timed([&] { return retarget::measure_level(reference, level.performer, level.signals, setting); });
     row.harmonics = level.signals.activation.harmonics();
     brief.baselines = false;
-    replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);
+    brief.feedback = io::feedback_of(creature.record);
     replay.duration_s = std::min(kBriefly, retarget::usual_duration(level.performer.prepared.target));
-    const retarget::Performances runs = retarget::perform_calmly(level.performer, level.signals, brief);
+    const retarget::Performances runs = retarget::perform_steadily(level.performer, level.signals, brief);
     row.falls = runs.main().report.fell || runs.main().termination != physics::Termination::kDone;
     row.stable = row.stable && !row.falls;
     curve_.rows.push_back(row);

@@ -191,17 +191,18 @@ retarget::PerformOptions Conversion::perform_options() const {
   result.replay.method = settings_.method;
   if (chosen_) take_steps(result.replay, chosen_->setting);
   result.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
-  result.replay.corrector.effort *= performances_.effort;
+  result.feedback = performances_.feedback;
   result.seed = options_.seed;
   result.threads = options_.threads;
   return result;
 }
 
-void Conversion::perform(const std::string& stage) {
-  const retarget::PerformOptions options = perform_options();
+void Conversion::perform(const std::string& stage, const retarget::Feedback& feedback) {
+  retarget::PerformOptions options = perform_options();
+  options.feedback = feedback;
   key_ = key_after(key_, signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
   if (chosen_) key_ = key_after(key_, options.replay.step_s);
-  performances_ = stages_.run(stage, key_, [&] { return retarget::perform_calmly(performer(), signals_, options); });
+  performances_ = stages_.run(stage, key_, [&] { return retarget::perform_steadily(performer(), signals_, options); });
 }
 
 void Conversion::follow(const retarget::NominalPath& path) {
@@ -222,7 +223,7 @@ void Conversion::polish() {
   signals_.force = polished.signals.force;
   follow(polished.path);
   signals_text_ = io::signals_text(signals_);
-  perform("polished_replay");
+  perform("polished_replay", before.feedback);
   if (is_down(performances_.main())) {
     signals_ = solved;
     performances_ = before;
@@ -230,14 +231,14 @@ void Conversion::polish() {
     signals_text_ = io::signals_text(signals_);
     return;
   }
-  performances_.effort *= before.effort;
+  if (performances_.wished_lapse == retarget::Lapse::kNothing) performances_.wished_lapse = before.wished_lapse;
   target_.report.polish = polish_report(polished.report.rounds, before, performances_);
 }
 
 void Conversion::write() {
   const retarget::Performer& performer = target_.performer;  // on its flat ground
   stages_.run("files", [&] {
-    writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.effort, settings_.nodes)));
+    writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.feedback, settings_.nodes)));
     writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                              dominant_bones_of_nodes(creature_.mesh.bone_weights)));
     writer_.write("target.bin", target_file_);

@@ -84,7 +84,7 @@ class Conversion {
 
   retarget::PerformOptions perform_options() const;
 
-  void perform(const std::string& stage = "replay");
+  void perform(const std::string& stage = "replay", const retarget::Feedback& feedback = {});
 
   /// Lets the signals take over what the corrector does in every cycle, and the creature go again.
   void polish();

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "io/fingerprint.h"
+#include "io/load_creature.h"
 
 namespace hydrostat::cli {
 
@@ -41,7 +42,7 @@ retarget::BodyReport body_report(const retarget::Creature& creature) {
 }
 
 io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
-                                   const std::optional<ChosenStep>& chosen, double effort, int nodes) {
+                                   const std::optional<ChosenStep>& chosen, const retarget::Feedback& feedback, int nodes) {
   io::CreatureRecord record;
   record.source_file = fs::absolute(options.clip_file).string();
   record.source_sha256 = report.source.sha256;
@@ -68,7 +69,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   if (options.import.to_s) record.settings.emplace_back("to", *options.import.to_s);
   if (!options.scene.empty()) record.settings.emplace_back("scene", fs::absolute(options.scene).string());
   if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
-  if (effort != 1) record.settings.emplace_back("corrector_effort", effort);
+  io::put_feedback(feedback, record);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
 }

@@ -16,9 +16,9 @@ retarget::SourceReport source_report(const ConvertOptions& options, const retarg
 
 retarget::BodyReport body_report(const retarget::Creature& creature);
 
-/// What creature.toml keeps of a conversion; `effort` is what feedback that was calmed takes, times the usual.
+/// What creature.toml keeps of a conversion.
 io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
-                                   const std::optional<ChosenStep>& chosen, double effort, int nodes);
+                                   const std::optional<ChosenStep>& chosen, const retarget::Feedback& feedback, int nodes);
 
 /// `before` and `after` have an open loop.
 retarget::PolishReport polish_report(int rounds, const retarget::Performances& before, const retarget::Performances& after);

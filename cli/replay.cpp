@@ -91,7 +91,7 @@ retarget::PerformOptions perform_options(const ReplayCommand& command, const io:
   retarget::PerformOptions options;
   options.replay.method = physics::method_named(io::setting(creature.record, "method", "")).value_or(physics::Method::kExplicit);
   take_steps(options.replay, {options.replay.method, io::setting(creature.record, "step_s", options.replay.step_s)});
-  options.replay.corrector.effort *= io::setting(creature.record, "corrector_effort", 1.0);
+  options.feedback = io::feedback_of(creature.record);
   options.replay.duration_s = command.duration > 0  ? command.duration
                               : command.cycles > 0 ? command.cycles * target.duration_s()
                                                    : retarget::usual_duration(target);
@@ -223,7 +223,7 @@ class Levels {
     put_in_scene(command_, creature);
     retarget::PerformOptions options = in_its_world(options_, creature.target.performer);
     options.baselines = options.replay.trace = false;
-    return retarget::perform_calmly(creature.target.performer, creature.signals, options).main();
+    return retarget::perform_steadily(creature.target.performer, creature.signals, options).main();
   }
 
   const ReplayCommand& command_;
@@ -296,7 +296,7 @@ int replay(const ReplayCommand& command) {
   const auto perform = [&] {
     return stages.run("replay", [&] {
       if (!command.level.is_asked()) return retarget::perform(performer, creature.signals, options);
-      return retarget::perform_calmly(performer, creature.signals, options);
+      return retarget::perform_steadily(performer, creature.signals, options);
     });
   };
   retarget::Performances performances = perform();
@@ -312,9 +312,9 @@ int replay(const ReplayCommand& command) {
     performances = perform();
   }
   const std::string way_up = is_down(performances.main()) ? levels.way_up(creature) : "";
-  options.replay.corrector.effort *= performances.effort;
   std::vector<std::string>& warnings = creature.target.report.warnings;
-  for (const std::string& warning : retarget::feedback_warnings(performances)) warnings.push_back(warning);
+  for (const std::string& warning : retarget::feedback_warnings(performances, options.feedback)) warnings.push_back(warning);
+  options.feedback = performances.feedback;
   if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
   const bool is_met = !chosen || chosen->report.is_met();
   if (!command.json) tell_level(creature.target.report, command.directory);

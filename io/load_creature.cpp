@@ -1,5 +1,7 @@
 #include "io/load_creature.h"
 
+#include <array>
+
 #include "io/body_file.h"
 #include "io/creature_directory.h"
 #include "io/path_file.h"
@@ -122,6 +124,27 @@ std::string setting(const CreatureRecord& record, const std::string& name, const
     if (const auto* text = std::get_if<std::string>(&value); text != nullptr && key == name) return *text;
   }
   return otherwise;
+}
+
+namespace {
+
+/// The factors by their names in creature.toml.
+std::array<std::pair<const char*, double*>, 3> named_factors(retarget::Feedback& feedback) {
+  return {{{"corrector_effort", &feedback.effort}, {"corrector_horizon", &feedback.horizon}, {"corrector_root_weight", &feedback.root_weight}}};
+}
+
+}  // namespace
+
+retarget::Feedback feedback_of(const CreatureRecord& record) {
+  retarget::Feedback feedback;
+  for (const auto& [name, factor] : named_factors(feedback)) *factor = setting(record, name, 1.0);
+  return feedback;
+}
+
+void put_feedback(retarget::Feedback feedback, CreatureRecord& record) {
+  for (const auto& [name, factor] : named_factors(feedback)) {
+    if (*factor != 1) record.settings.emplace_back(name, *factor);
+  }
 }
 
 }  // namespace hydrostat::io

@@ -29,4 +29,8 @@ retarget::CreatureOptions level_options(const LoadedCreature& loaded);
 double setting(const CreatureRecord& record, const std::string& name, double otherwise);
 std::string setting(const CreatureRecord& record, const std::string& name, const std::string& otherwise);
 
+/// The feedback that a creature keeps its way by, and the settings of creature.toml that tell it: none where it is the usual.
+retarget::Feedback feedback_of(const CreatureRecord& record);
+void put_feedback(retarget::Feedback feedback, CreatureRecord& record);
+
 }  // namespace hydrostat::io

@@ -224,9 +224,14 @@ void name_fields(RecordArchive& archive, retarget::Replay& replay) {
   archive.list("patches", "patch", course.patch_state);
 }
 
+void name_fields(RecordArchive& archive, retarget::Feedback& feedback) {
+  archive.fields("effort", feedback.effort, "horizon", feedback.horizon, "root_weight", feedback.root_weight);
+}
+
 void name_fields(RecordArchive& archive, retarget::Performances& performances) {
   archive.fields("naive", performances.naive, "open_loop", performances.open_loop, "closed_loop", performances.closed_loop,
-                 "effort", performances.effort);
+                 "feedback", performances.feedback, "lapse", performances.lapse,
+                 "wished_lapse", performances.wished_lapse);
 }
 
 void name_fields(RecordArchive& archive, retarget::SourceReport& report) {

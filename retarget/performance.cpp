@@ -12,6 +12,16 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kErrorSeconds = 1;  // at most, over which the substep's error is measured
+constexpr double kLeastTravel = 0.05;  // of L a cycle, of a clip that travels
+constexpr double kLostWay = 0.08;      // of the clip's
+constexpr double kCircle = 10 * M_PI / 180;  // by which a clip turns before its way ends elsewhere than it led to
+// Tried in this order. The quick ones keep bodies up whose feet slide under the usual gain; pushes they recover from less often.
+constexpr Feedback kOthers[] = {{},
+                                {.effort = 1, .horizon = 0.6, .root_weight = 4.0 / 3},
+                                {.effort = 1, .horizon = 0.5, .root_weight = 10.0 / 3},
+                                {.effort = 4, .horizon = 1, .root_weight = 1},
+                                {.effort = 16, .horizon = 1, .root_weight = 1},
+                                {.effort = 64, .horizon = 1, .root_weight = 1}};
 
 using FeedForward = std::function<void(double, Eigen::VectorXd&)>;
 
@@ -47,6 +57,20 @@ Replay run(const Performer& performer, const physics::Scene& plant, const FeedFo
   in_world.pushes.insert(in_world.pushes.end(), performer.world.pushes.begin(), performer.world.pushes.end());
   in_world.moves = performer.world.moves;
   return replay(input, in_world);
+}
+
+/// Whether what the creature goes through is what its clip was solved for.
+bool is_as_planned(const Performer& performer, const ReplayOptions& options) {
+  const Eigen::Vector3d& gravity = performer.scene.gravity;
+  const bool is_level = gravity.x() == 0 && gravity.z() == 0;
+  return is_level && !performer.world.is_told() && performer.scene.obstacles.empty() && options.pushes.empty();
+}
+
+/// Whether a run has a way that can be held against the clip's.
+bool has_way(const Performer& performer, const ReplayOptions& options, const ReplayReport& report) {
+  const double turned = std::abs(performer.prepared.target.yaw) * std::max(1.0, report.cycles);
+  return is_as_planned(performer, options) && report.clip_travel_per_cycle_length >= kLeastTravel && report.cycles > 1 - 1e-6 &&
+         turned < kCircle;
 }
 
 }  // namespace
@@ -94,26 +118,39 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
   auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, run_baselines);
   ReplayOptions main = options.replay;
   main.correct = options.closed_loop;
+  main.corrector = with(options.feedback, options.replay.corrector);
+  result.feedback = options.feedback;
   (options.closed_loop ? result.closed_loop : result.open_loop) = 
       run(performer, plant, signals_of(signals), signals.limit, main, &performer.path);
   beside.get();
   return result;
 }
 
-Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run) {
+  const ReplayReport& report = run.report;
+  if (report.fell || run.termination != physics::Termination::kDone) return Lapse::kFell;
+  if (!has_way(performer, options, report)) return Lapse::kNothing;
+  const double way = report.clip_travel_per_cycle_length;
+  return std::abs(report.travel_per_cycle_length - way) > kLostWay * way ? Lapse::kLostWay : Lapse::kNothing;
+}
+
+Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
   Performances result = perform(performer, signals, options);
-  PerformOptions calmer = options;
-  calmer.baselines = false;
-  const auto is_up = [](const Performances& runs) {
-    return !runs.main().report.fell && runs.main().termination == physics::Termination::kDone;
-  };
-  for (const double factor : {4.0, 16.0, 64.0}) {
-    if (!options.closed_loop || is_up(result)) break;
-    calmer.replay.corrector.effort = factor * options.replay.corrector.effort;
-    Performances next = perform(performer, signals, calmer);
-    if (!is_up(next)) continue;
+  if (!options.closed_loop) return result;
+  const auto lapse = [&](const Performances& runs) { return lapse_of(performer, options.replay, runs.main()); };
+  result.lapse = result.wished_lapse = lapse(result);
+  PerformOptions other = options;
+  other.baselines = false;
+  for (const Feedback& feedback : kOthers) {
+    if (result.lapse == Lapse::kNothing) break;
+    if (feedback == options.feedback) continue;
+    other.feedback = feedback;
+    Performances next = perform(performer, signals, other);
+    const Lapse its = lapse(next);
+    if (its == Lapse::kFell || its == result.lapse) continue;
     result.closed_loop = std::move(next.closed_loop);
-    result.effort = factor;
+    result.feedback = feedback;
+    result.lapse = its;
   }
   return result;
 }

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "retarget/control_mesh.h"
+#include "retarget/feedback.h"
 #include "retarget/morphs.h"
 #include "retarget/nominal_path.h"
 #include "retarget/replay.h"
@@ -35,6 +36,7 @@ struct Performer {
 /// Which free runs are wanted, and how.
 struct PerformOptions {
   ReplayOptions replay;    // `correct` is the run's own; the trace is of the closed loop, or of the open loop where that is the main run
+  Feedback feedback;       // by which its corrector acts
   unsigned seed = 0;       // 0: the body as it was planned; else see variation_of
   double variation = 0.02; // how far a seed's body may differ from the plan
   bool closed_loop = true; // false: the open loop is the main run
@@ -42,11 +44,16 @@ struct PerformOptions {
   int threads = 2;         // two let the baselines run beside the main run; the outcome does not hang on it
 };
 
+/// What a run comes short of.
+enum class Lapse { kNothing, kFell, kLostWay };
+
 /// Free runs of one body: naive (the target's lengths as rest lengths), open loop (the signals alone), closed loop. Those that
 /// were not wanted are empty; the closed or the open loop is there.
 struct Performances {
   std::optional<Replay> naive, open_loop, closed_loop;
-  double effort = 1;  // of the closed loop's feedback, over what was wished
+  Feedback feedback;  // of the closed loop
+  // Told by perform_steadily: what the closed loop comes short of, and what it did on the feedback that was wished.
+  Lapse lapse = Lapse::kNothing, wished_lapse = Lapse::kNothing;
 
   /// The closed loop where there is one, else the open loop.
   const Replay& main() const { return closed_loop ? *closed_loop : *open_loop; }
@@ -67,9 +74,15 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 /// options. The signals play from their coefficients with all layers. The corrector's model knows of no obstacles.
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
-/// The same, on calmer feedback where the closed loop falls: effort is 4, 16, then 64 times as dear, and the first with which
-/// it stays up counts, or the usual one where none does. On coarse bodies a gain that others need shakes the feet loose.
-Performances perform_calmly(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
+/// Whether it fell or diverged, or makes its way by over 8 % longer or shorter than the clip. A way that counts is one over level ground, for
+/// a whole cycle at least, on which nothing is but the creature: no scene, no push. What hardly travels, or in a circle, has none.
+Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
+
+/// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, such as looks less
+/// far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times as much. The first that does neither counts, or
+/// else the first that stays up, or else what was wished. On some bodies, coarse ones above all, a gain that others need shakes the
+/// feet loose.
+Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's
 /// substep is halved.

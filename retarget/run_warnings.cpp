@@ -31,6 +31,22 @@ std::string patches_in_contact(const ContactSchedule& contacts, std::size_t fram
   return names.empty() ? "in flight" : "standing on " + names;
 }
 
+/// As what follows a verb.
+std::string in_words(const Feedback& feedback) {
+  std::string words;
+  const auto add = [&words](const char* form, double factor) {
+    if (factor != 1) words += (words.empty() ? "where " : " and ") + sentence(form, factor);
+  };
+  add("effort is %.3g times as dear as usual", feedback.effort);
+  add("the horizon is %.3g times as long as usual", feedback.horizon);
+  add("momentum weighs %.3g times as much", feedback.root_weight);
+  return words.empty() ? "on the usual one" : words;
+}
+
+std::string part_of_way(const ReplayReport& report) {
+  return sentence("%.0f %% of the clip's way", 100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length);
+}
+
 }  // namespace
 
 std::vector<std::string> target_warnings(const PreparedTarget& prepared, const physics::Body& body, double limit,
@@ -70,10 +86,15 @@ std::vector<std::string> inverse_warnings(const InverseReport& inverse) {
   return warnings;
 }
 
-std::vector<std::string> feedback_warnings(const Performances& performances) {
-  if (performances.effort == 1) return {};
-  return {"feedback: it keeps up only where effort is " + std::to_string(std::lround(performances.effort)) +
-          " times as dear as usual"};
+std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished) {
+  const bool has_way = performances.lapse == Lapse::kNothing;
+  if (performances.feedback == wished && performances.lapse != Lapse::kLostWay) return {};
+  const std::string way = part_of_way(performances.main().report);
+  if (performances.feedback == wished) return {"feedback: the creature makes " + way + ", and keeps it on no other gain that was tried"};
+  const bool fell = performances.wished_lapse == Lapse::kFell;
+  const std::string first = std::string("feedback: on ") + (wished == Feedback() ? "the usual gain" : "its own gain") + " the creature " +
+                            (fell ? "falls" : "loses its way") + ", it " + (fell ? "stays up " : "keeps it ") + in_words(performances.feedback);
+  return {has_way ? first : first + ", but makes " + way};
 }
 
 }  // namespace hydrostat::retarget

@@ -15,7 +15,8 @@ std::vector<std::string> target_warnings(const PreparedTarget& prepared, const p
 /// The same about what the inverse dynamics found.
 std::vector<std::string> inverse_warnings(const InverseReport& inverse);
 
-/// That a creature stays up on calmer feedback alone (perform_calmly); none where the usual one will do.
-std::vector<std::string> feedback_warnings(const Performances& performances);
+/// Which feedback took the place of what was wished (perform_steadily) and why, or that a creature loses its way on any; none where what
+/// was wished will do, nor of a fall, which is told elsewhere.
+std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished = {});
 
 }  // namespace hydrostat::retarget

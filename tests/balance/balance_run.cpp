@@ -123,6 +123,7 @@ int run(int argc, char** argv) {
   retarget::PerformOptions options;
   Slope slope;
   double nodes = 0;  // of the level of detail; 0: the creature itself
+  options.feedback = io::feedback_of(creature.record);
   set_variant(variant, options.replay, slope, nodes);
   if (nodes > 0) take_level(directory, nodes, creature);
   if (argc > 7) io::put_in_scene(argv[7], performer);
@@ -137,7 +138,7 @@ int run(int argc, char** argv) {
   const double angle = 2 * M_PI * static_cast<double>(random()) / 4294967296.0;
   if (seed != 0) options.replay.pushes.push_back(shove(0, angle, kFirstShove * static_cast<double>(random()) / 4294967296.0));
   if (push != "none") options.replay.pushes.push_back(parse_push(push, target.loop ? target.duration_s() : 0.25));
-  const auto& let_go = nodes > 0 ? retarget::perform_calmly : retarget::perform;
+  const auto& let_go = nodes > 0 ? retarget::perform_steadily : retarget::perform;
   const retarget::Replay replay = *let_go(performer, creature.signals, options).closed_loop;
   const retarget::ReplayReport& r = replay.report;
   const double travel = r.clip_travel_per_cycle_length > 0.01 ? r.travel_per_cycle_length / r.clip_travel_per_cycle_length : 1;

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <map>
 
+#include "io/load_creature.h"
 #include "io/write_file.h"
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
@@ -58,6 +60,21 @@ TEST(CreatureRecord, WritesNumbersAsShortAsTheyReadBackTheSame) {
     EXPECT_NE(to_toml(record).find("\nx = " + text + "\n"), std::string::npos) << to_toml(record);
     write_file(directory.path / "creature.toml", to_toml(record));
     EXPECT_EQ(read_creature_record(directory.path).settings.at(0).second, CreatureRecord::Setting(number));
+  }
+}
+
+TEST(CreatureRecord, GivesFeedbackBackAndTellsNothingOfTheUsual) {
+  const TemporaryDirectory directory;
+  for (const retarget::Feedback& feedback : {retarget::Feedback(), {16, 1, 1}, {1, 0.6, 4.0 / 3}, {3, 0.5, 10.0 / 3}}) {
+    CreatureRecord record = example();
+    put_feedback(feedback, record);
+    write_file(directory.path / "creature.toml", to_toml(record));
+    const CreatureRecord back = read_creature_record(directory.path);
+    EXPECT_EQ(feedback_of(back), feedback);
+    for (const auto& [name, factor] : std::map<std::string, double>{
+             {"corrector_effort", feedback.effort}, {"corrector_horizon", feedback.horizon}, {"corrector_root_weight", feedback.root_weight}}) {
+      EXPECT_EQ(setting(back, name, 0.0), factor == 1 ? 0 : factor) << name;
+    }
   }
 }
 

@@ -13,8 +13,14 @@ TEST(StageRecords, GivePerformancesBackToTheBit) {
   retarget::PerformOptions options;
   options.replay.duration_s = 0.1;
   options.baselines = false;
-  const retarget::Performances runs = retarget::perform(performer, retarget::signals_of(performer), options);
+  retarget::Performances runs = retarget::perform(performer, retarget::signals_of(performer), options);
+  runs.feedback = {4, 0.5, 1.5};
+  runs.lapse = retarget::Lapse::kLostWay;
+  runs.wished_lapse = retarget::Lapse::kFell;
   const auto read = result_of<retarget::Performances>(record_of(runs));
+  EXPECT_EQ(read.feedback, runs.feedback);
+  EXPECT_EQ(read.lapse, runs.lapse);
+  EXPECT_EQ(read.wished_lapse, runs.wished_lapse);
   EXPECT_FALSE(read.naive || read.open_loop);
   ASSERT_TRUE(read.closed_loop);
   EXPECT_EQ(read.closed_loop->motion.frames, runs.closed_loop->motion.frames);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/retarget/box_performer.h"
 
 namespace hydrostat::retarget::performance_test {
@@ -56,23 +58,145 @@ TEST(Perform, RunsOnlyWhatIsWanted) {
   EXPECT_EQ(open.main().report.correction_rms, 0);
 }
 
-/// Feedback that is too eager for how late it knows shakes the body down: the search ends at the first effort that does not.
-TEST(PerformCalmly, TakesTheFirstEffortThatStaysUp) {
+const std::vector<Feedback> kInTurn{{1, 0.6, 4.0 / 3}, {1, 0.5, 10.0 / 3}, {4, 1, 1}, {16, 1, 1}, {64, 1, 1}};
+
+Performances perform_by(const Feedback& feedback, const Performer& performer, const SignalSet& signals, PerformOptions options) {
+  options.feedback = feedback;
+  options.baselines = false;
+  return perform(performer, signals, options);
+}
+
+TEST(Feedback, IsFactorsOnTheCorrectorsOptions) {
+  CorrectorOptions options;
+  options.effort = 2, options.horizon_s = 0.05, options.root_weight = 4;
+  const CorrectorOptions other = with({3, 0.5, 1.5}, options), same = with({}, options);
+  EXPECT_DOUBLE_EQ(other.effort, 6);
+  EXPECT_DOUBLE_EQ(other.horizon_s, 0.025);
+  EXPECT_DOUBLE_EQ(other.root_weight, 6);
+  EXPECT_EQ(other.settle_s, options.settle_s);
+  EXPECT_EQ(same.effort, 2);
+  EXPECT_EQ(same.horizon_s, 0.05);
+  EXPECT_EQ(same.root_weight, 4);
+}
+
+TEST(PerformSteadily, KeepsWhatWasWishedWhereThatWillDo) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  for (const Feedback& wished : {Feedback(), Feedback{2, 1, 1}}) {
+    PerformOptions options = lasting(0.5);
+    options.feedback = wished;
+    const Performances runs = perform_steadily(performer, signals, options);
+    EXPECT_EQ(runs.feedback, wished);
+    EXPECT_EQ(runs.wished_lapse, Lapse::kNothing);
+    EXPECT_EQ(runs.main().motion.frames, perform_by(wished, performer, signals, options).main().motion.frames);
+  }
+}
+
+/// Feedback that is too eager for how late it knows shakes the body down: the search ends at the first gain that does not.
+TEST(PerformSteadily, TakesTheFirstThatStaysUp) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1.5);
-  EXPECT_EQ(perform_calmly(performer, signals, options).effort, 1);
-  const auto falls = [](const Performances& runs) { return runs.main().report.fell; };
   options.replay.observation.delay_s = 0.1;
-  ASSERT_TRUE(falls(perform(performer, signals, options)));
-  const Performances calm = perform_calmly(performer, signals, options);
-  EXPECT_FALSE(falls(calm));
-  EXPECT_GT(calm.effort, 1);
-  EXPECT_TRUE(calm.naive && calm.open_loop);
-  options.replay.corrector.effort *= calm.effort / 4;
-  EXPECT_TRUE(falls(perform(performer, signals, options)));
-  options.replay.corrector.effort *= 4;
-  EXPECT_TRUE(calm.main().motion.frames == perform(performer, signals, options).main().motion.frames);
+  const auto falls_by = [&](const Feedback& feedback) { return perform_by(feedback, performer, signals, options).main().report.fell; };
+  ASSERT_TRUE(falls_by({}));
+  const Performances steady = perform_steadily(performer, signals, options);
+  const auto taken = std::find(kInTurn.begin(), kInTurn.end(), steady.feedback);
+  ASSERT_NE(taken, kInTurn.end());
+  EXPECT_TRUE(std::all_of(kInTurn.begin(), taken, falls_by));
+  EXPECT_FALSE(steady.main().report.fell);
+  EXPECT_EQ(steady.wished_lapse, Lapse::kFell);
+  EXPECT_EQ(steady.lapse, Lapse::kNothing);
+  EXPECT_TRUE(steady.naive && steady.open_loop);
+  EXPECT_EQ(steady.main().motion.frames, perform_by(*taken, performer, signals, options).main().motion.frames);
+}
+
+/// The box as it glides over ground that hardly holds it, so far that gains differ in how far.
+Performer make_gliding_performer() {
+  constexpr double kWay = 0.1;  // [m] a period
+  Performer performer = make_box_performer();
+  Motion& target = performer.prepared.target;
+  target.travel = Eigen::Vector3d(kWay, 0, 0);
+  for (Eigen::Index f = 0; f < target.count(); ++f) {
+    target.at(f).row(0).array() += kWay * static_cast<double>(f) / static_cast<double>(target.count());
+  }
+  performer.scene.ground.friction = 0.1;
+  performer.clip_points = point_motion(performer.scene.contact_points, target);
+  return performer;
+}
+
+/// The clip's way [per L] that a run which comes to `keeps` keeps, and one that comes to `loses` does not.
+double way_between(double keeps, double loses) { return (keeps + loses) / 2 / (keeps > loses ? 0.92 : 1.08); }
+
+TEST(PerformSteadily, TakesAnotherGainWhereTheWishedOneLosesItsWay) {
+  Performer performer = make_gliding_performer();
+  const SignalSet signals = signals_of(performer);
+  const PerformOptions options = lasting(1);
+  const Performances usual = perform_by({}, performer, signals, options), quick = perform_by(kInTurn[0], performer, signals, options);
+  const double near = usual.main().report.travel_per_cycle_length, far = quick.main().report.travel_per_cycle_length;
+  ASSERT_NE(near, far);
+
+  performer.clip_points.travel.x() = performer.length * way_between(far, near);
+  const Performances steady = perform_steadily(performer, signals, options);
+  EXPECT_EQ(steady.feedback, kInTurn[0]);
+  EXPECT_EQ(steady.wished_lapse, Lapse::kLostWay);
+  EXPECT_EQ(steady.lapse, Lapse::kNothing);
+  EXPECT_EQ(steady.main().motion.frames, quick.main().motion.frames);
+  EXPECT_TRUE(steady.naive && steady.open_loop);
+  PerformOptions pushed = options;
+  pushed.replay.pushes.emplace_back();
+  EXPECT_EQ(perform_steadily(performer, signals, pushed).feedback, Feedback()) << "no way is planned for what is pushed";
+
+  performer.clip_points.travel.x() = performer.length * way_between(near, far);
+  EXPECT_EQ(perform_steadily(performer, signals, options).feedback, Feedback()) << "the usual gain keeps the way";
+
+  performer.clip_points.travel.x() = 10 * performer.length * std::max(near, far);
+  const Performances lost = perform_steadily(performer, signals, options);
+  EXPECT_EQ(lost.feedback, Feedback()) << "on no gain it comes so far";
+  EXPECT_EQ(lost.lapse, Lapse::kLostWay);
+  EXPECT_EQ(lost.main().motion.frames, usual.main().motion.frames);
+}
+
+/// Three cycles, on which it makes `share` of its way.
+Replay way_made(double share, double way = 0.5) {
+  Replay run;
+  run.report.cycles = 3;
+  run.report.clip_travel_per_cycle_length = way;
+  run.report.travel_per_cycle_length = share * way;
+  return run;
+}
+
+TEST(LapseOf, IsAFallOrAWayThatIsOverEightPerCentOff) {
+  const Performer performer = make_box_performer();
+  for (const double share : {0.93, 1.0, 1.07}) EXPECT_EQ(lapse_of(performer, {}, way_made(share)), Lapse::kNothing) << share;
+  for (const double share : {-1.0, 0.0, 0.91, 1.09}) EXPECT_EQ(lapse_of(performer, {}, way_made(share)), Lapse::kLostWay) << share;
+  Replay fallen = way_made(0), diverged = way_made(1);
+  fallen.report.fell = true;
+  diverged.termination = physics::Termination::kDiverged;
+  EXPECT_EQ(lapse_of(performer, {}, fallen), Lapse::kFell);
+  EXPECT_EQ(lapse_of(performer, {}, diverged), Lapse::kFell);
+}
+
+TEST(LapseOf, AsksForNoWayWhereNoneIsPlannedOrNoneWasGone) {
+  const Replay lost = way_made(0.5);
+  const Performer plain = make_box_performer();
+  ASSERT_EQ(lapse_of(plain, {}, lost), Lapse::kLostWay);
+  EXPECT_EQ(lapse_of(plain, {}, way_made(0.5, 0.04)), Lapse::kNothing) << "it hardly travels";
+  Replay brief = lost;
+  brief.report.cycles = 0.9;
+  EXPECT_EQ(lapse_of(plain, {}, brief), Lapse::kNothing) << "less than a cycle";
+  ReplayOptions pushed;
+  pushed.pushes.emplace_back();
+  EXPECT_EQ(lapse_of(plain, pushed, lost), Lapse::kNothing) << "a push";
+  Performer turning = plain, in_scene = plain, among_obstacles = plain, on_slope = plain;
+  turning.prepared.target.yaw = 0.1;
+  EXPECT_EQ(lapse_of(turning, {}, lost), Lapse::kNothing) << "a circle";
+  in_scene.world.decisions.emplace_back();
+  EXPECT_EQ(lapse_of(in_scene, {}, lost), Lapse::kNothing) << "a scene";
+  among_obstacles.scene.obstacles.emplace_back();
+  EXPECT_EQ(lapse_of(among_obstacles, {}, lost), Lapse::kNothing) << "an obstacle";
+  on_slope.scene.gravity.x() = 1;
+  EXPECT_EQ(lapse_of(on_slope, {}, lost), Lapse::kNothing) << "a slope";
 }
 
 TEST(VariationOf, IsNothingForSeed0AndWithinTwoPerCentForOthers) {

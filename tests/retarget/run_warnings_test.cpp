@@ -43,11 +43,39 @@ TEST(InverseWarnings, ComeOnePerFigureThatIsTooLarge) {
   EXPECT_EQ(inverse_warnings(report).size(), 3U);
 }
 
-TEST(FeedbackWarnings, TellOfCalmerFeedbackAlone) {
+Performances performances_of(double travel, const Feedback& feedback, Lapse wished, Lapse lapse) {
   Performances performances;
-  EXPECT_TRUE(feedback_warnings(performances).empty());
-  performances.effort = 16;
-  EXPECT_EQ(feedback_warnings(performances), std::vector<std::string>{"feedback: it keeps up only where effort is 16 times as dear as usual"});
+  performances.closed_loop.emplace().report.travel_per_cycle_length = travel;
+  performances.closed_loop->report.clip_travel_per_cycle_length = 0.5;
+  performances.feedback = feedback;
+  performances.wished_lapse = wished;
+  performances.lapse = lapse;
+  return performances;
+}
+
+TEST(FeedbackWarnings, SayNothingWhereWhatWasWishedWillDoOrFallsOnAnyGain) {
+  EXPECT_TRUE(feedback_warnings(performances_of(0.5, {}, Lapse::kNothing, Lapse::kNothing)).empty());
+  EXPECT_TRUE(feedback_warnings(performances_of(0.1, {}, Lapse::kFell, Lapse::kFell)).empty());
+  EXPECT_TRUE(feedback_warnings(performances_of(0.5, {4, 1, 1}, Lapse::kNothing, Lapse::kNothing), {4, 1, 1}).empty());
+}
+
+TEST(FeedbackWarnings, TellWhichGainWasTakenAndWhy) {
+  const auto told = [](const Performances& performances, const Feedback& wished = {}) {
+    const std::vector<std::string> warnings = feedback_warnings(performances, wished);
+    return warnings.size() == 1 ? warnings.front() : std::to_string(warnings.size()) + " warnings";
+  };
+  EXPECT_EQ(told(performances_of(0.5, {16, 1, 1}, Lapse::kFell, Lapse::kNothing)),
+            "feedback: on the usual gain the creature falls, it stays up where effort is 16 times as dear as usual");
+  EXPECT_EQ(told(performances_of(0.5, {1, 0.5, 1.5}, Lapse::kLostWay, Lapse::kNothing)),
+            "feedback: on the usual gain the creature loses its way, it keeps it where the horizon is 0.5 times as long as usual and "
+            "momentum weighs 1.5 times as much");
+  EXPECT_EQ(told(performances_of(0.4, {16, 1, 1}, Lapse::kFell, Lapse::kLostWay)),
+            "feedback: on the usual gain the creature falls, it stays up where effort is 16 times as dear as usual, but makes 80 % of the "
+            "clip's way");
+  EXPECT_EQ(told(performances_of(0.5, {}, Lapse::kFell, Lapse::kNothing), {4, 1, 1}),
+            "feedback: on its own gain the creature falls, it stays up on the usual one");
+  EXPECT_EQ(told(performances_of(0.4, {}, Lapse::kLostWay, Lapse::kLostWay)),
+            "feedback: the creature makes 80 % of the clip's way, and keeps it on no other gain that was tried");
 }
 
 }  // namespace

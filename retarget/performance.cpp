@@ -13,7 +13,9 @@ namespace {
 
 constexpr double kErrorSeconds = 1;  // at most, over which the substep's error is measured
 constexpr double kLeastTravel = 0.05;  // of L a cycle, of a clip that travels
-constexpr double kLostWay = 0.08;      // of the clip's
+constexpr double kOffTravel = 0.08;    // of it, more or less, from which its way is lost
+constexpr double kOffDrift = 0.04;     // likewise of drift a cycle: measured, what is well drifts by 1.3 % at most, what staggers by 5 % and more
+constexpr double kLeastCycles = 4;     // of a loop, which tell its drift
 constexpr double kCircle = 10 * M_PI / 180;  // by which a clip turns before its way ends elsewhere than it led to
 // Tried in this order. The quick ones keep bodies up whose feet slide under the usual gain; pushes they recover from less often.
 constexpr Feedback kOthers[] = {{},
@@ -22,6 +24,7 @@ constexpr Feedback kOthers[] = {{},
                                 {.effort = 4, .horizon = 1, .root_weight = 1},
                                 {.effort = 16, .horizon = 1, .root_weight = 1},
                                 {.effort = 64, .horizon = 1, .root_weight = 1}};
+constexpr double kBetter = 0.5;  // share of the straying that another gain is worth its while from
 
 using FeedForward = std::function<void(double, Eigen::VectorXd&)>;
 
@@ -66,11 +69,23 @@ bool is_as_planned(const Performer& performer, const ReplayOptions& options) {
   return is_level && !performer.world.is_told() && performer.scene.obstacles.empty() && options.pushes.empty();
 }
 
-/// Whether a run has a way that can be held against the clip's.
-bool has_way(const Performer& performer, const ReplayOptions& options, const ReplayReport& report) {
-  const double turned = std::abs(performer.prepared.target.yaw) * std::max(1.0, report.cycles);
-  return is_as_planned(performer, options) && report.clip_travel_per_cycle_length >= kLeastTravel && report.cycles > 1 - 1e-6 &&
-         turned < kCircle;
+/// How far a run is off the clip's way, in units of what loses it; without end where it is down.
+double straying(const Performer& performer, const ReplayOptions& options, const Replay& run) {
+  const ReplayReport& report = run.report;
+  const Motion& target = performer.prepared.target;
+  const double way = report.clip_travel_per_cycle_length;
+  if (report.fell || run.termination != physics::Termination::kDone) return HUGE_VAL;
+  if (!is_as_planned(performer, options) || way < kLeastTravel || report.cycles < 1 - 1e-6) return 0;
+  const bool turns = std::abs(target.yaw) * report.cycles > kCircle;
+  const bool tells_drift = !target.loop || report.cycles > kLeastCycles - 1e-6;
+  const double travel = turns ? 0 : std::abs(report.travel_per_cycle_length - way) / (kOffTravel * way);
+  const double drift = tells_drift ? report.drift_per_cycle_length / (kOffDrift * way) : 0;
+  return std::max(travel, drift);
+}
+
+Lapse lapse_of(double straying) {
+  if (straying == HUGE_VAL) return Lapse::kFell;
+  return straying > 1 ? Lapse::kLostWay : Lapse::kNothing;
 }
 
 }  // namespace
@@ -127,31 +142,28 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
 }
 
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run) {
-  const ReplayReport& report = run.report;
-  if (report.fell || run.termination != physics::Termination::kDone) return Lapse::kFell;
-  if (!has_way(performer, options, report)) return Lapse::kNothing;
-  const double way = report.clip_travel_per_cycle_length;
-  return std::abs(report.travel_per_cycle_length - way) > kLostWay * way ? Lapse::kLostWay : Lapse::kNothing;
+  return lapse_of(straying(performer, options, run));
 }
 
 Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
   Performances result = perform(performer, signals, options);
   if (!options.closed_loop) return result;
-  const auto lapse = [&](const Performances& runs) { return lapse_of(performer, options.replay, runs.main()); };
-  result.lapse = result.wished_lapse = lapse(result);
+  double least = straying(performer, options.replay, result.main());
+  result.wished_lapse = lapse_of(least);
   PerformOptions other = options;
   other.baselines = false;
   for (const Feedback& feedback : kOthers) {
-    if (result.lapse == Lapse::kNothing) break;
+    if (least <= 1) break;
     if (feedback == options.feedback) continue;
     other.feedback = feedback;
     Performances next = perform(performer, signals, other);
-    const Lapse its = lapse(next);
-    if (its == Lapse::kFell || its == result.lapse) continue;
+    const double its = straying(performer, options.replay, next.main());
+    if (its > 1 && its >= kBetter * least) continue;
+    least = its;
     result.closed_loop = std::move(next.closed_loop);
     result.feedback = feedback;
-    result.lapse = its;
   }
+  result.lapse = lapse_of(least);
   return result;
 }
 

@@ -74,14 +74,15 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 /// options. The signals play from their coefficients with all layers. The corrector's model knows of no obstacles.
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
-/// Whether it fell or diverged, or makes its way by over 8 % longer or shorter than the clip. A way that counts is one over level ground, for
-/// a whole cycle at least, on which nothing is but the creature: no scene, no push. What hardly travels, or in a circle, has none.
+/// Whether it fell or diverged, or lost its way: travels by over 8 % of the clip's travel more or less than that, or drifts by over 4 % of
+/// it a cycle (of a loop of four cycles or more). Only what travels has a way to lose, over level ground and undisturbed, without scene or push, for a
+/// cycle at least; of a loop that turns its drift alone counts.
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
 
 /// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, such as looks less
-/// far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times as much. The first that does neither counts, or
-/// else the first that stays up, or else what was wished. On some bodies, coarse ones above all, a gain that others need shakes the
-/// feet loose.
+/// far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times as much. The first that does neither counts;
+/// where none does, what stays up and strays least, the earlier one unless a later strays less than half as far. On some bodies, coarse
+/// ones above all, a gain that others need shakes the feet loose.
 Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's

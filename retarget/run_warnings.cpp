@@ -43,8 +43,9 @@ std::string in_words(const Feedback& feedback) {
   return words.empty() ? "on the usual one" : words;
 }
 
-std::string part_of_way(const ReplayReport& report) {
-  return sentence("%.0f %% of the clip's way", 100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length);
+std::string way_in_words(const ReplayReport& report) {
+  return sentence("makes %.0f %% of the clip's way and drifts %.2g %% L a cycle",
+                  100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length, 100 * report.drift_per_cycle_length);
 }
 
 }  // namespace
@@ -87,14 +88,15 @@ std::vector<std::string> inverse_warnings(const InverseReport& inverse) {
 }
 
 std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished) {
-  const bool has_way = performances.lapse == Lapse::kNothing;
-  if (performances.feedback == wished && performances.lapse != Lapse::kLostWay) return {};
-  const std::string way = part_of_way(performances.main().report);
-  if (performances.feedback == wished) return {"feedback: the creature makes " + way + ", and keeps it on no other gain that was tried"};
-  const bool fell = performances.wished_lapse == Lapse::kFell;
-  const std::string first = std::string("feedback: on ") + (wished == Feedback() ? "the usual gain" : "its own gain") + " the creature " +
-                            (fell ? "falls" : "loses its way") + ", it " + (fell ? "stays up " : "keeps it ") + in_words(performances.feedback);
-  return {has_way ? first : first + ", but makes " + way};
+  const bool is_lost = performances.lapse == Lapse::kLostWay, fell = performances.wished_lapse == Lapse::kFell;
+  if (performances.feedback == wished) {
+    if (!is_lost) return {};
+    return {"feedback: the creature " + way_in_words(performances.main().report) + ", and strays half as far on no other gain"};
+  }
+  const std::string usual = wished == Feedback() ? "the usual gain" : "its own gain";
+  const std::string instead = fell ? "stays up " : is_lost ? "strays less " : "keeps it ";
+  const std::string taken = "feedback: on " + usual + " the creature " + (fell ? "falls" : "loses its way") + ", it " + instead + in_words(performances.feedback);
+  return {is_lost ? taken + ", but " + way_in_words(performances.main().report) : taken};
 }
 
 }  // namespace hydrostat::retarget

@@ -88,7 +88,7 @@ TEST(PerformSteadily, KeepsWhatWasWishedWhereThatWillDo) {
     const Performances runs = perform_steadily(performer, signals, options);
     EXPECT_EQ(runs.feedback, wished);
     EXPECT_EQ(runs.wished_lapse, Lapse::kNothing);
-    EXPECT_EQ(runs.main().motion.frames, perform_by(wished, performer, signals, options).main().motion.frames);
+    EXPECT_TRUE(runs.main().motion.frames == perform_by(wished, performer, signals, options).main().motion.frames);
   }
 }
 
@@ -108,7 +108,7 @@ TEST(PerformSteadily, TakesTheFirstThatStaysUp) {
   EXPECT_EQ(steady.wished_lapse, Lapse::kFell);
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
   EXPECT_TRUE(steady.naive && steady.open_loop);
-  EXPECT_EQ(steady.main().motion.frames, perform_by(*taken, performer, signals, options).main().motion.frames);
+  EXPECT_TRUE(steady.main().motion.frames == perform_by(*taken, performer, signals, options).main().motion.frames);
 }
 
 /// The box as it glides over ground that hardly holds it, so far that gains differ in how far.
@@ -131,7 +131,7 @@ double way_between(double keeps, double loses) { return (keeps + loses) / 2 / (k
 TEST(PerformSteadily, TakesAnotherGainWhereTheWishedOneLosesItsWay) {
   Performer performer = make_gliding_performer();
   const SignalSet signals = signals_of(performer);
-  const PerformOptions options = lasting(1);
+  const PerformOptions options = lasting(0.6);  // three cycles, too few to tell drift
   const Performances usual = perform_by({}, performer, signals, options), quick = perform_by(kInTurn[0], performer, signals, options);
   const double near = usual.main().report.travel_per_cycle_length, far = quick.main().report.travel_per_cycle_length;
   ASSERT_NE(near, far);
@@ -141,7 +141,7 @@ TEST(PerformSteadily, TakesAnotherGainWhereTheWishedOneLosesItsWay) {
   EXPECT_EQ(steady.feedback, kInTurn[0]);
   EXPECT_EQ(steady.wished_lapse, Lapse::kLostWay);
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
-  EXPECT_EQ(steady.main().motion.frames, quick.main().motion.frames);
+  EXPECT_TRUE(steady.main().motion.frames == quick.main().motion.frames);
   EXPECT_TRUE(steady.naive && steady.open_loop);
   PerformOptions pushed = options;
   pushed.replay.pushes.emplace_back();
@@ -154,7 +154,7 @@ TEST(PerformSteadily, TakesAnotherGainWhereTheWishedOneLosesItsWay) {
   const Performances lost = perform_steadily(performer, signals, options);
   EXPECT_EQ(lost.feedback, Feedback()) << "on no gain it comes so far";
   EXPECT_EQ(lost.lapse, Lapse::kLostWay);
-  EXPECT_EQ(lost.main().motion.frames, usual.main().motion.frames);
+  EXPECT_TRUE(lost.main().motion.frames == usual.main().motion.frames);
 }
 
 /// Three cycles, on which it makes `share` of its way.
@@ -166,13 +166,19 @@ Replay way_made(double share, double way = 0.5) {
   return run;
 }
 
-TEST(LapseOf, IsAFallOrAWayThatIsOverEightPerCentOff) {
+TEST(LapseOf, IsAFallOrTravelThatIsOverEightOrDriftOverFourPerCentOfTheWay) {
   const Performer performer = make_box_performer();
   for (const double share : {0.93, 1.0, 1.07}) EXPECT_EQ(lapse_of(performer, {}, way_made(share)), Lapse::kNothing) << share;
   for (const double share : {-1.0, 0.0, 0.91, 1.09}) EXPECT_EQ(lapse_of(performer, {}, way_made(share)), Lapse::kLostWay) << share;
   Replay fallen = way_made(0), diverged = way_made(1);
   fallen.report.fell = true;
   diverged.termination = physics::Termination::kDiverged;
+  Replay veering = way_made(1), drifting = way_made(1);
+  veering.report.drift_per_cycle_length = 0.019;
+  drifting.report.drift_per_cycle_length = 0.021;
+  for (Replay* run : {&veering, &drifting}) run->report.cycles = 4;
+  EXPECT_EQ(lapse_of(performer, {}, veering), Lapse::kNothing);
+  EXPECT_EQ(lapse_of(performer, {}, drifting), Lapse::kLostWay);
   EXPECT_EQ(lapse_of(performer, {}, fallen), Lapse::kFell);
   EXPECT_EQ(lapse_of(performer, {}, diverged), Lapse::kFell);
 }
@@ -185,12 +191,17 @@ TEST(LapseOf, AsksForNoWayWhereNoneIsPlannedOrNoneWasGone) {
   Replay brief = lost;
   brief.report.cycles = 0.9;
   EXPECT_EQ(lapse_of(plain, {}, brief), Lapse::kNothing) << "less than a cycle";
+  Replay drifting = way_made(1);
+  drifting.report.drift_per_cycle_length = 0.1;
+  EXPECT_EQ(lapse_of(plain, {}, drifting), Lapse::kNothing) << "too few cycles to tell the drift";
   ReplayOptions pushed;
   pushed.pushes.emplace_back();
   EXPECT_EQ(lapse_of(plain, pushed, lost), Lapse::kNothing) << "a push";
   Performer turning = plain, in_scene = plain, among_obstacles = plain, on_slope = plain;
   turning.prepared.target.yaw = 0.1;
   EXPECT_EQ(lapse_of(turning, {}, lost), Lapse::kNothing) << "a circle";
+  drifting.report.cycles = 4;
+  EXPECT_EQ(lapse_of(turning, {}, drifting), Lapse::kLostWay) << "out of the circle";
   in_scene.world.decisions.emplace_back();
   EXPECT_EQ(lapse_of(in_scene, {}, lost), Lapse::kNothing) << "a scene";
   among_obstacles.scene.obstacles.emplace_back();

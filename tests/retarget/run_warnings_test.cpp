@@ -47,6 +47,7 @@ Performances performances_of(double travel, const Feedback& feedback, Lapse wish
   Performances performances;
   performances.closed_loop.emplace().report.travel_per_cycle_length = travel;
   performances.closed_loop->report.clip_travel_per_cycle_length = 0.5;
+  performances.closed_loop->report.drift_per_cycle_length = 0.025;
   performances.feedback = feedback;
   performances.wished_lapse = wished;
   performances.lapse = lapse;
@@ -71,11 +72,14 @@ TEST(FeedbackWarnings, TellWhichGainWasTakenAndWhy) {
             "momentum weighs 1.5 times as much");
   EXPECT_EQ(told(performances_of(0.4, {16, 1, 1}, Lapse::kFell, Lapse::kLostWay)),
             "feedback: on the usual gain the creature falls, it stays up where effort is 16 times as dear as usual, but makes 80 % of the "
-            "clip's way");
+            "clip's way and drifts 2.5 % L a cycle");
+  EXPECT_EQ(told(performances_of(0.4, {16, 1, 1}, Lapse::kLostWay, Lapse::kLostWay)),
+            "feedback: on the usual gain the creature loses its way, it strays less where effort is 16 times as dear as usual, but makes 80 % of "
+            "the clip's way and drifts 2.5 % L a cycle");
   EXPECT_EQ(told(performances_of(0.5, {}, Lapse::kFell, Lapse::kNothing), {4, 1, 1}),
             "feedback: on its own gain the creature falls, it stays up on the usual one");
   EXPECT_EQ(told(performances_of(0.4, {}, Lapse::kLostWay, Lapse::kLostWay)),
-            "feedback: the creature makes 80 % of the clip's way, and keeps it on no other gain that was tried");
+            "feedback: the creature makes 80 % of the clip's way and drifts 2.5 % L a cycle, and strays half as far on no other gain");
 }
 
 }  // namespace

@@ -37,7 +37,8 @@ struct Slope {
 };
 
 /// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; of the ground: "slope=5:side=90"; or of the
-/// control mesh: "lod=52", as replay has it, with calmer feedback where it falls.
+/// control mesh: "lod=52", as replay has it, with other feedback where it falls or loses its way. The creature's own feedback is factors
+/// on all that.
 void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Slope& slope, double& nodes) {
   retarget::CorrectorOptions& options = replay.corrector;
   const std::map<std::string, double*> knobs{{"effort", &options.effort},       {"settle", &options.settle_s},

@@ -192,6 +192,7 @@ retarget::PerformOptions Conversion::perform_options() const {
   if (chosen_) take_steps(result.replay, chosen_->setting);
   result.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
   result.feedback = performances_.feedback;
+  result.may_regulate = true;
   result.seed = options_.seed;
   result.threads = options_.threads;
   return result;

@@ -128,22 +128,28 @@ std::string setting(const CreatureRecord& record, const std::string& name, const
 
 namespace {
 
-/// The factors by their names in creature.toml.
-std::array<std::pair<const char*, double*>, 3> named_factors(retarget::Feedback& feedback) {
-  return {{{"corrector_effort", &feedback.effort}, {"corrector_horizon", &feedback.horizon}, {"corrector_root_weight", &feedback.root_weight}}};
+/// The numbers by their names in creature.toml.
+std::array<std::pair<const char*, double*>, 4> named_numbers(retarget::Feedback& feedback) {
+  return {{{"corrector_effort", &feedback.effort},
+           {"corrector_horizon", &feedback.horizon},
+           {"corrector_root_weight", &feedback.root_weight},
+           {"corrector_regulator", &feedback.regulator}}};
 }
 
 }  // namespace
 
 retarget::Feedback feedback_of(const CreatureRecord& record) {
   retarget::Feedback feedback;
-  for (const auto& [name, factor] : named_factors(feedback)) *factor = setting(record, name, 1.0);
+  for (const auto& [name, number] : named_numbers(feedback)) *number = setting(record, name, *number);
   return feedback;
 }
 
 void put_feedback(retarget::Feedback feedback, CreatureRecord& record) {
-  for (const auto& [name, factor] : named_factors(feedback)) {
-    if (*factor != 1) record.settings.emplace_back(name, *factor);
+  retarget::Feedback usual;
+  const auto numbers = named_numbers(feedback), usual_numbers = named_numbers(usual);
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const auto& [name, number] = numbers[k];
+    if (*number != *usual_numbers[k].second) record.settings.emplace_back(name, *number);
   }
 }
 

@@ -225,7 +225,8 @@ void name_fields(RecordArchive& archive, retarget::Replay& replay) {
 }
 
 void name_fields(RecordArchive& archive, retarget::Feedback& feedback) {
-  archive.fields("effort", feedback.effort, "horizon", feedback.horizon, "root_weight", feedback.root_weight);
+  archive.fields("effort", feedback.effort, "horizon", feedback.horizon, "root_weight", feedback.root_weight, "regulator",
+                 feedback.regulator);
 }
 
 void name_fields(RecordArchive& archive, retarget::Performances& performances) {

@@ -9,6 +9,7 @@ namespace {
 constexpr double kPointLoad = 1e-6, kPatchLoad = 0.01;  // [m g]
 constexpr double kEarth = 9.81;                         // [m/s2]
 constexpr double kFarAway = 1e300;                      // [m]
+constexpr double kSink = 5e-4, kSinkTime = 1.0 / 30;    // of L; [s]
 constexpr double kStillSpeed = 0.01;                    // of sqrt(g L): a loaded patch that moves faster slides
 
 /// Velocity of a contact point along the ground.
@@ -27,6 +28,10 @@ ContactThresholds contact_thresholds(const physics::Scene& scene, double length,
 double gravity_unit(const physics::Scene& scene) {
   const double gravity = scene.gravity.norm();
   return gravity > 0 ? gravity : kEarth;
+}
+
+double contact_stiffness(const physics::Scene& scene, double length, double horizon_s) {
+  return scene.body.mass.sum() * gravity_unit(scene) / (kSink * length) * std::pow(kSinkTime / horizon_s, 2);
 }
 
 double height_above_ground(const physics::Scene& scene, const physics::State& state, int point) {

@@ -17,6 +17,10 @@ ContactThresholds contact_thresholds(const physics::Scene& scene, double length,
 /// The strength of gravity, or the Earth's where there is none [m/s2]: a unit for forces and speeds.
 double gravity_unit(const physics::Scene& scene);
 
+/// How stiff [N/m] a model that looks horizon_s [s] ahead in one step holds a contact point: against the body's own springs that is stiff,
+/// and soft enough for a factor. Over 1/30 s a point gives half a thousandth of L, `length` [m], under the weight.
+double contact_stiffness(const physics::Scene& scene, double length, double horizon_s);
+
 /// Height [m] of a contact point above what is nearest: the ground or an obstacle; negative inside. Far away where there is neither.
 double height_above_ground(const physics::Scene& scene, const physics::State& state, int point);
 

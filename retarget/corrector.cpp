@@ -11,11 +11,18 @@
 namespace hydrostat::retarget {
 namespace {
 
+constexpr double kUsualHorizon = 1.0 / 30;  // [s] whatever the usual one is, contact is as stiff
 constexpr double kLedFoot = 3;  // times as much weighs a foot on uneven ground, where it is to be put in a place
 
 /// 3N: the squared weight of each row of nodes.
 Eigen::VectorXd shares_of_nodes(const physics::Body& body, double weight) {
   return (weight * weight / body.mass.sum()) * body.mass.transpose().replicate<3, 1>().reshaped();
+}
+
+/// R x 3N: the projection of fields that `heading` has turned.
+Eigen::MatrixXd turned(Eigen::MatrixXd project, const Eigen::Matrix3d& heading) {
+  for (Eigen::Index i = 0; i < project.cols(); i += 3) project.middleCols<3>(i) *= heading.transpose();
+  return project;
 }
 
 }  // namespace
@@ -25,10 +32,10 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
     : scene_(scene),
       muscles_(muscles),
       options_(options),
+      length_(length),
       speed_unit_(std::sqrt(gravity_unit(scene) * length)),
       limit_(limit),
-      // Stiff against the body's own springs, soft enough for the factor: a point gives half a thousandth of L under the weight.
-      contact_stiffness_(scene.body.mass.sum() * gravity_unit(scene) / (5e-4 * length)),
+      contact_stiffness_(contact_stiffness(scene, length, options.regulator.reach > 0 ? options.horizon_s : kUsualHorizon)),
       node_shares_(shares_of_nodes(scene.body, options.node_weight / speed_unit_)),
       responses_(scene, muscles, options.horizon_s, contact_stiffness_, node_shares_),
       forces_(scene.body) {
@@ -133,25 +140,43 @@ double Corrector::least_margin() const {
   return (cones_.leftCols(previous_.size()) * previous_ + cones_.col(previous_.size())).minCoeff();
 }
 
-double Corrector::correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
-                          Eigen::VectorXd& activation) {
-  const physics::Body& body = scene_.body;
-  const Eigen::Index muscles = muscles_.fields.cols();
+/// Finds what comes without any muscle; false: nothing is to be added.
+bool Corrector::begin(const physics::State& state, const physics::State& reference, const ContactNow& contact, const Eigen::VectorXd& activation,
+                      int response_every) {
   forces_.set_activation(activation);
-  const bool is_calm = momentum_error_ < options_.calm_error;  // a creature that fights a push needs its response fresh
-  if (!responses_.update(state, forces_, contact.touching, is_calm ? options_.response_every : 1)) {
-    previous_.setZero();  // nothing is added
-    return 0;
+  if (!responses_.update(state, forces_, contact.touching, response_every)) {
+    previous_.setZero();
+    return false;
   }
   find_free_deviation(state, reference);
+  return true;
+}
+
+void Corrector::find_cones(const ContactNow& contact) {
+  const double weight = scene_.body.mass.sum() * gravity_unit(scene_);
+  cone_rows(scene_, contact.touching, held_to_cones(contact), contact.force / weight,
+            (contact_stiffness_ * options_.horizon_s / weight) * responses_.velocities(), previous_, cones_);
+}
+
+/// By the muscles that are best within the cones.
+double Corrector::act(const Eigen::MatrixXd& left, const Eigen::VectorXd& right, Eigen::VectorXd& activation) {
+  previous_ = solve_within_cones(left, right, cones_, options_.cone_weight);
+  activation += muscles_.fields * previous_;
+  activation = activation.cwiseMax(1 - limit_).cwiseMin(1 + limit_);
+  return std::sqrt(previous_.squaredNorm() / static_cast<double>(previous_.size()));
+}
+
+double Corrector::correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
+                          Eigen::VectorXd& activation) {
+  const Eigen::Index muscles = muscles_.fields.cols();
+  const bool is_calm = momentum_error_ < options_.calm_error;  // a creature that fights a push needs its response fresh
+  if (!begin(state, reference, contact, activation, is_calm ? options_.response_every : 1)) return 0;
 
   // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.
   weighted_.resize(6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
   find_step(state, reference);
   weigh_feet(state, reference, contact);
-  const double weight = body.mass.sum() * gravity_unit(scene_);
-  cone_rows(scene_, contact.touching, held_to_cones(contact), contact.force / weight,
-            (contact_stiffness_ * options_.horizon_s / weight) * responses_.velocities(), previous_, cones_);
+  find_cones(contact);
   deviation_ += (state.x - reference.x).reshaped() / options_.settle_s;
   momentum_error_ = weigh_momentum(state, contact);
 
@@ -162,10 +187,26 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   const double calm = options_.calm / (1 + std::pow(momentum_error_ / options_.calm_error, 2));
   left.diagonal().array() += options_.effort * (1 + calm) + options_.change;
   const Eigen::VectorXd right = options_.change * previous_ - normal_.row(muscles).head(muscles).transpose() - pulled;
-  previous_ = solve_within_cones(left, right, cones_, options_.cone_weight);
-  activation += muscles_.fields * previous_;
-  activation = activation.cwiseMax(1 - limit_).cwiseMin(1 + limit_);
-  return std::sqrt(previous_.squaredNorm() / static_cast<double>(muscles));
+  return act(left, right, activation);
+}
+
+double Corrector::regulate(const CostToGo& cost, double time_s, const Eigen::Matrix3d& heading, const physics::State& state,
+                           const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation) {
+  if (!begin(state, reference, contact, activation, 1)) return 0;
+  find_cones(contact);
+  const Eigen::Index muscles = muscles_.fields.cols(), modes = cost.modes().count();
+  const Eigen::MatrixXd project = turned(cost.modes().project, heading);
+  const double h = options_.horizon_s;
+  Eigen::MatrixXd after(2 * modes, muscles + 1);  // z by each muscle, and without any
+  after.bottomLeftCorner(modes, muscles).noalias() = project * responses_.velocities() / speed_unit_;
+  after.bottomRightCorner(modes, 1).noalias() = project * deviation_ / speed_unit_;
+  after.topRows(modes) = (h * speed_unit_ / length_) * after.bottomRows(modes);
+  after.topRightCorner(modes, 1).noalias() += project * (state.x - reference.x).reshaped() / length_;
+  const Eigen::MatrixXd weighed = cost.at(time_s + h).cast<double>() * after;
+  const auto by_muscles = after.leftCols(muscles).transpose();
+  Eigen::MatrixXd left = by_muscles * weighed.leftCols(muscles);
+  left.diagonal().array() += options_.regulator.effort;
+  return act(left, -by_muscles * weighed.col(muscles), activation);
 }
 
 }  // namespace hydrostat::retarget

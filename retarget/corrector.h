@@ -3,6 +3,7 @@
 #include "physics/internal_forces.h"
 #include "physics/stepper.h"
 #include "retarget/contacts.h"
+#include "retarget/cost_to_go.h"
 #include "retarget/muscle_response.h"
 
 namespace hydrostat::retarget {
@@ -24,6 +25,7 @@ struct CorrectorOptions {
   double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
   double long_step = 0.15;      // of h: what is longer is stepped at once, whatever the plan; infinite: never
   int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
+  RegulatorOptions regulator;   // that takes the place of all that but the cones, within its reach
 };
 
 /// What contact does when muscles are corrected, and what it is to do.
@@ -51,6 +53,9 @@ struct ContactNow {
 /// the plan does not know which of them bear. Sources: the design, section 8; Raibert, "Legged
 /// Robots That Balance", 1986, for the placement of feet by speed; Pratt et al., "Capture Point: A Step toward Humanoid Push
 /// Recovery", Humanoids 2006, for the way that sqrt(h / g) gives.
+///
+/// Where a cost to go is known, regulate() takes the place of that target: min_w z' S z + effort |w|^2 + the excess over cones, of
+/// the deviation z after one control step (horizon_s), by the same response, so that what touches counts as it is and not as planned.
 class Corrector {
  public:
   /// length [m] is L. Scene and muscles must outlive the corrector.
@@ -61,7 +66,12 @@ class Corrector {
   /// muscles' correction.
   double correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
                  Eigen::VectorXd& activation);
+  /// The same by what deviations cost from the time [s] on; `heading` turns the motion's first period into this one.
+  double regulate(const CostToGo& cost, double time_s, const Eigen::Matrix3d& heading, const physics::State& state,
+                  const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation);
   void reset();
+  /// What acted in its stead.
+  void follow(const Eigen::VectorXd& muscles) { previous_ = muscles; }
   const Eigen::VectorXd& muscles_now() const { return previous_; }
   /// How far inside their cones the forces at bearing points stay over the horizon, by the last correction's own model [m
   /// g]; negative outside, 0 where nothing bears.
@@ -73,11 +83,15 @@ class Corrector {
   void find_step(const physics::State& state, const physics::State& reference);
   void weigh_feet(const physics::State& state, const physics::State& reference, const ContactNow& contact);
   std::vector<bool> held_to_cones(const ContactNow& contact) const;
+  bool begin(const physics::State& state, const physics::State& reference, const ContactNow& contact, const Eigen::VectorXd& activation,
+             int response_every);
+  void find_cones(const ContactNow& contact);
+  double act(const Eigen::MatrixXd& left, const Eigen::VectorXd& right, Eigen::VectorXd& activation);
 
   const physics::Scene& scene_;
   const Muscles& muscles_;
   CorrectorOptions options_;
-  double speed_unit_, limit_, contact_stiffness_;
+  double length_, speed_unit_, limit_, contact_stiffness_;
   Eigen::VectorXd node_shares_;  // 3N: the squared weight of each row of nodes
   MuscleResponse responses_;
   physics::InternalForces<3> forces_;

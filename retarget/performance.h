@@ -40,6 +40,7 @@ struct PerformOptions {
   unsigned seed = 0;       // 0: the body as it was planned; else see variation_of
   double variation = 0.02; // how far a seed's body may differ from the plan
   bool closed_loop = true; // false: the open loop is the main run
+  bool may_regulate = false;  // perform_steadily: a regulator is among what is tried; it takes time that levels' budgets do not count
   bool baselines = true;   // naive, and the open loop beside the closed one
   int threads = 2;         // two let the baselines run beside the main run; the outcome does not hang on it
 };
@@ -79,7 +80,7 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
 /// cycle at least; of a loop that turns its drift alone counts.
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
 
-/// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, such as looks less
+/// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, a regulator where that may be, such as looks less
 /// far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times as much. The first that does neither counts;
 /// where none does, what stays up and strays least, the earlier one unless a later strays less than half as far. On some bodies, coarse
 /// ones above all, a gain that others need shakes the feet loose.

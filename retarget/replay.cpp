@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
+#include <utility>
 
 #include "physics/effect.h"
+#include "retarget/contact_loads.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/divergence.h"
 #include "retarget/fall.h"
@@ -39,23 +42,51 @@ physics::State first_state(const Motion& target, const MotionCurve& curve, Nomin
   return state;
 }
 
+/// The corrector's options as the plan and its path want them.
+CorrectorOptions gain_for(const ReplayInput& input, const ReplayOptions& options) {
+  CorrectorOptions gain = gain_of_leaps(input.prepared, gain_on_path(input, options.corrector));
+  gain.regulator.reach = 0;
+  return gain;
+}
+
+/// Of a regulator, that looks ahead by its cost to go, and a control step at a time.
+CorrectorOptions regulated(CorrectorOptions gain, const RegulatorOptions& regulator, double control_s) {
+  gain.regulator = regulator;
+  gain.horizon_s = control_s;
+  return gain;
+}
+
+/// None where nothing is to be regulated, or cannot be.
+std::shared_ptr<const CostToGo> cost_for(const ReplayInput& input, const ReplayOptions& options, double control_s) {
+  if (!options.correct || options.corrector.regulator.reach == 0) return nullptr;
+  const NominalPath path = path_of(input);
+  const RegulatedMotion motion{input.model, input.muscles, input.prepared, path, input.feed_forward, input.length};
+  const auto cost = std::make_shared<const CostToGo>(find_cost_to_go(motion, control_s, options.corrector.regulator));
+  return cost->is_sound() ? cost : nullptr;
+}
+
 std::optional<physics::Scene> moving_plant(const ReplayInput& input, const ReplayOptions& options) {
   return options.moves.empty() ? std::nullopt : std::optional(input.scene);
 }
 
+double control_step(const ReplayOptions& options) { return options.step_s * options.steps_per_control; }
+
 /// One free simulation, from control step to control step.
 class Run {
  public:
-  Run(const ReplayInput& input, const ReplayOptions& options);
+  Run(const ReplayInput& input, const ReplayOptions& options) : Run(input, options, cost_for(input, options, control_step(options))) {}
   Replay play();
 
  private:
+  Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr<const CostToGo> cost);
   void look_at_body();
   void keep_way();
   ReturnMap::Answers ask_model() const;
   WayError go_for_a_cycle(const ReturnMap::Handles& handles);
   const physics::State& estimate();
   void look_at_way(const physics::State& seen, double time_s);
+  Eigen::Matrix3d heading_now() const;
+  void correct(const physics::State& seen);
   void control();
   void take_note(const physics::State& seen);
   void command(double time_s);
@@ -77,8 +108,11 @@ class Run {
   NominalPathCurve path_;
   const std::unique_ptr<physics::Stepper> stepper_;
   const std::vector<std::unique_ptr<physics::EffectOf<3>>> effects_;
+  const std::shared_ptr<const CostToGo> cost_;
+  const double wave_speed_;  // [m/s] sqrt(g L)
   const CorrectorOptions gain_;
   Corrector corrector_;
+  std::optional<Corrector> regulator_;  // near the path, where a cost to go is known
   Observer observer_;
   StateEstimate estimate_;
   ReferenceGlide glide_;
@@ -111,11 +145,11 @@ class Run {
   Replay result_;
 };
 
-Run::Run(const ReplayInput& input, const ReplayOptions& options)
+Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr<const CostToGo> cost)
     : input_(input),
       options_(options),
       target_(input.prepared.target),
-      control_s_(options.step_s * options.steps_per_control),
+      control_s_(control_step(options)),
       steps_(std::lround(options.duration_s / control_s_)),
       steps_per_frame_(std::max(1L, std::lround(1 / (target_.rate_hz * control_s_)))),
       mass_shares_(input.scene.body.mass / input.scene.body.mass.sum()),
@@ -125,7 +159,9 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
       path_(path_of(input)),
       stepper_(physics::make_stepper(options.method, plant_)),
       effects_(physics::plan_effects(plant_)),
-      gain_(gain_of_leaps(input.prepared, gain_on_path(input, options.corrector))),
+      cost_(std::move(cost)),
+      wave_speed_(std::sqrt(gravity_unit(input.model) * input.length)),
+      gain_(gain_for(input, options)),
       corrector_(input.model, input.muscles, input.length, input.limit, gain_),
       observer_(options.observation, control_s_),
       estimate_(options.observation, control_s_, input.scene.gravity.norm()),
@@ -153,6 +189,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options)
   const bool is_seen = options.correct && options.observation.is_exact();
   if (is_seen && target_.loop && has_flight(input.prepared)) strength_.emplace(input.model, control_s_);
   if (is_seen) brace_.emplace(input.prepared, input.scene.body, input.scene.gravity.norm());
+  if (cost_) regulator_.emplace(input.model, input.muscles, input.length, input.limit, regulated(gain_, options.corrector.regulator, control_s_));
   if (options.lesson) options.lesson->make_room(activation_.size(), state_.x.size(), steps_);
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);
@@ -185,11 +222,11 @@ ReturnMap::Answers Run::ask_model() const {
   alone.moves.clear();
   alone.trace = false;
   alone.lesson = nullptr;
-  Run first(believed, alone);
+  Run first(believed, alone, cost_);
   ReturnMap::Answers errors;
   errors.col(0) = first.go_for_a_cycle(ReturnMap::trial(0));
   for (int k = 0; k <= ReturnMap::kHandles; ++k) {
-    Run second(believed, alone);
+    Run second(believed, alone, cost_);
     second.state_ = first.state_;
     second.time_s_ = first.time_s_;
     second.cycles_ = 1;
@@ -229,19 +266,39 @@ void Run::look_at_way(const physics::State& seen, double time_s) {
   fit_ = best_rigid_fit(reference_.x, seen.x, mass_shares_);
 }
 
+/// The turn from the target's first period to where the glided reference is.
+Eigen::Matrix3d Run::heading_now() const {
+  const long cycle = target_.loop ? static_cast<long>(std::floor(time_s_ / target_.duration_s() + 1e-9)) : 0;
+  return Eigen::AngleAxisd(glide_.yaw, Eigen::Vector3d::UnitY()).toRotationMatrix() * after_cycles(target_, cycle).linear();
+}
+
 /// What this control step teaches about the path.
 void Run::take_note(const physics::State& seen) {
   Lesson& lesson = *options_.lesson;
   const auto step = std::lround(time_s_ / control_s_);
   if (step >= lesson.time_s.size()) return;
-  const long cycle = target_.loop ? static_cast<long>(std::floor(time_s_ / target_.duration_s() + 1e-9)) : 0;
-  const Eigen::Matrix3d back =
-      (after_cycles(target_, cycle).linear().transpose() * Eigen::AngleAxisd(-glide_.yaw, Eigen::Vector3d::UnitY())).eval();
+  const Eigen::Matrix3d back = heading_now().transpose();
   lesson.time_s[step] = time_s_;
   input_.feed_forward(time_s_ + 0.5 * control_s_, mean_activation_);
   lesson.added.col(step) = activation_ - mean_activation_;
   lesson.place.col(step) = (back * (seen.x - glided_.x)).reshaped();
   lesson.velocity.col(step) = (back * (seen.v - glided_.v)).reshaped();
+}
+
+/// Adds the correction to activation_: of a small deviation the regulator's, for there the motion is as linear as its plan takes it to be.
+void Run::correct(const physics::State& seen) {
+  Corrector* one = &corrector_;
+  Corrector* other = regulator_ ? &*regulator_ : nullptr;
+  const bool is_near = cost_ && cost_->of(deviation_along(cost_->modes(), heading_now(), seen, glided_, input_.length, wave_speed_), time_s_) <
+                                    options_.corrector.regulator.reach;
+  if (is_near) {
+    std::swap(one, other);
+    one->regulate(*cost_, time_s_, heading_now(), seen, glided_, contact_, activation_);
+  } else {
+    one->correct(seen, glided_, contact_, activation_);
+  }
+  correction_ = one->muscles_now();
+  if (other) other->follow(correction_);
 }
 
 /// The correction for the coming control step, by what is seen of the body.
@@ -265,8 +322,7 @@ void Run::control() {
   }
   command(time_s_ + 0.5 * control_s_);
   feedback_ = -activation_;
-  corrector_.correct(seen, glided_, contact_, activation_);
-  correction_ = corrector_.muscles_now();
+  correct(seen);
   feedback_ += activation_;
   if (options_.lesson) take_note(seen);
 }

@@ -34,12 +34,13 @@ std::string patches_in_contact(const ContactSchedule& contacts, std::size_t fram
 /// As what follows a verb.
 std::string in_words(const Feedback& feedback) {
   std::string words;
-  const auto add = [&words](const char* form, double factor) {
-    if (factor != 1) words += (words.empty() ? "where " : " and ") + sentence(form, factor);
+  const auto add = [&words](const char* form, double number, double usual = 1) {
+    if (number != usual) words += (words.empty() ? "where " : " and ") + sentence(form, number);
   };
   add("effort is %.3g times as dear as usual", feedback.effort);
   add("the horizon is %.3g times as long as usual", feedback.horizon);
   add("momentum weighs %.3g times as much", feedback.root_weight);
+  add(feedback.regulator < 1 ? "a regulator answers what is small, costs up to %.3g" : "a regulator answers all", feedback.regulator, 0);
   return words.empty() ? "on the usual one" : words;
 }
 

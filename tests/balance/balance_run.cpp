@@ -36,7 +36,7 @@ struct Slope {
   }
 };
 
-/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; of the ground: "slope=5:side=90"; or of the
+/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; "regulator=0.001:cost=1e-4"; of the ground: "slope=5:side=90"; or of the
 /// control mesh: "lod=52", as replay has it, with other feedback where it falls or loses its way. The creature's own feedback is factors
 /// on all that.
 void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Slope& slope, double& nodes) {
@@ -49,6 +49,10 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
                                              {"long_step", &options.long_step},
                                              {"clearance", &options.clearance},
                                              {"calm", &options.calm},         {"calm_error", &options.calm_error},
+                                             {"regulator", &options.regulator.reach},
+                                             {"place", &options.regulator.place},
+                                             {"speed", &options.regulator.speed},
+                                             {"cost", &options.regulator.effort},
                                              {"slope", &slope.degrees},       {"side", &slope.side},
                                              {"lod", &nodes},
                                              {"noise", &replay.observation.noise_m},
@@ -57,6 +61,10 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
   for (std::string part; std::getline(parts, part, ':');) {
     if (part == "usual") continue;
     const std::size_t equals = part.find('=');
+    if (part.substr(0, equals) == "modes" && equals != std::string::npos) {
+      options.regulator.modes = std::stoi(part.substr(equals + 1));
+      continue;
+    }
     if (part.substr(0, equals) == "every" && equals != std::string::npos) {
       options.response_every = std::stoi(part.substr(equals + 1));
       continue;

@@ -65,7 +65,7 @@ TEST(CreatureRecord, WritesNumbersAsShortAsTheyReadBackTheSame) {
 
 TEST(CreatureRecord, GivesFeedbackBackAndTellsNothingOfTheUsual) {
   const TemporaryDirectory directory;
-  for (const retarget::Feedback& feedback : {retarget::Feedback(), {16, 1, 1}, {1, 0.6, 4.0 / 3}, {3, 0.5, 10.0 / 3}}) {
+  for (const retarget::Feedback& feedback : {retarget::Feedback(), {16, 1, 1}, {1, 0.6, 4.0 / 3}, {3, 0.5, 10.0 / 3}, {1, 1, 1, 1e-3}}) {
     CreatureRecord record = example();
     put_feedback(feedback, record);
     write_file(directory.path / "creature.toml", to_toml(record));
@@ -75,6 +75,7 @@ TEST(CreatureRecord, GivesFeedbackBackAndTellsNothingOfTheUsual) {
              {"corrector_effort", feedback.effort}, {"corrector_horizon", feedback.horizon}, {"corrector_root_weight", feedback.root_weight}}) {
       EXPECT_EQ(setting(back, name, 0.0), factor == 1 ? 0 : factor) << name;
     }
+    EXPECT_EQ(setting(back, "corrector_regulator", -1.0), feedback.regulator == 0 ? -1 : feedback.regulator);
   }
 }
 

@@ -58,7 +58,7 @@ TEST(Perform, RunsOnlyWhatIsWanted) {
   EXPECT_EQ(open.main().report.correction_rms, 0);
 }
 
-const std::vector<Feedback> kInTurn{{1, 0.6, 4.0 / 3}, {1, 0.5, 10.0 / 3}, {4, 1, 1}, {16, 1, 1}, {64, 1, 1}};
+const std::vector<Feedback> kInTurn{{1, 1, 1, 1e-3}, {1, 1, 1, 1}, {1, 0.6, 4.0 / 3}, {1, 0.5, 10.0 / 3}, {4, 1, 1}, {16, 1, 1}, {64, 1, 1}};
 
 Performances perform_by(const Feedback& feedback, const Performer& performer, const SignalSet& signals, PerformOptions options) {
   options.feedback = feedback;
@@ -69,11 +69,13 @@ Performances perform_by(const Feedback& feedback, const Performer& performer, co
 TEST(Feedback, IsFactorsOnTheCorrectorsOptions) {
   CorrectorOptions options;
   options.effort = 2, options.horizon_s = 0.05, options.root_weight = 4;
-  const CorrectorOptions other = with({3, 0.5, 1.5}, options), same = with({}, options);
+  const CorrectorOptions other = with({3, 0.5, 1.5, 0.01}, options), same = with({}, options);
   EXPECT_DOUBLE_EQ(other.effort, 6);
   EXPECT_DOUBLE_EQ(other.horizon_s, 0.025);
   EXPECT_DOUBLE_EQ(other.root_weight, 6);
   EXPECT_EQ(other.settle_s, options.settle_s);
+  EXPECT_EQ(other.regulator.reach, 0.01);
+  EXPECT_EQ(same.regulator.reach, 0);
   EXPECT_EQ(same.effort, 2);
   EXPECT_EQ(same.horizon_s, 0.05);
   EXPECT_EQ(same.root_weight, 4);
@@ -97,6 +99,7 @@ TEST(PerformSteadily, TakesTheFirstThatStaysUp) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1.5);
+  options.may_regulate = true;
   options.replay.observation.delay_s = 0.1;
   const auto falls_by = [&](const Feedback& feedback) { return perform_by(feedback, performer, signals, options).main().report.fell; };
   ASSERT_TRUE(falls_by({}));
@@ -132,13 +135,13 @@ TEST(PerformSteadily, TakesAnotherGainWhereTheWishedOneLosesItsWay) {
   Performer performer = make_gliding_performer();
   const SignalSet signals = signals_of(performer);
   const PerformOptions options = lasting(0.6);  // three cycles, too few to tell drift
-  const Performances usual = perform_by({}, performer, signals, options), quick = perform_by(kInTurn[0], performer, signals, options);
+  const Performances usual = perform_by({}, performer, signals, options), quick = perform_by(kInTurn[2], performer, signals, options);
   const double near = usual.main().report.travel_per_cycle_length, far = quick.main().report.travel_per_cycle_length;
   ASSERT_NE(near, far);
 
   performer.clip_points.travel.x() = performer.length * way_between(far, near);
   const Performances steady = perform_steadily(performer, signals, options);
-  EXPECT_EQ(steady.feedback, kInTurn[0]);
+  EXPECT_EQ(steady.feedback, kInTurn[2]);
   EXPECT_EQ(steady.wished_lapse, Lapse::kLostWay);
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
   EXPECT_TRUE(steady.main().motion.frames == quick.main().motion.frames);

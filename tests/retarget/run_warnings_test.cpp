@@ -70,6 +70,10 @@ TEST(FeedbackWarnings, TellWhichGainWasTakenAndWhy) {
   EXPECT_EQ(told(performances_of(0.5, {1, 0.5, 1.5}, Lapse::kLostWay, Lapse::kNothing)),
             "feedback: on the usual gain the creature loses its way, it keeps it where the horizon is 0.5 times as long as usual and "
             "momentum weighs 1.5 times as much");
+  EXPECT_EQ(told(performances_of(0.5, {1, 1, 1, 1e-3}, Lapse::kFell, Lapse::kNothing)),
+            "feedback: on the usual gain the creature falls, it stays up where a regulator answers what is small, costs up to 0.001");
+  EXPECT_EQ(told(performances_of(0.5, {1, 1, 1, 1}, Lapse::kFell, Lapse::kNothing)),
+            "feedback: on the usual gain the creature falls, it stays up where a regulator answers all");
   EXPECT_EQ(told(performances_of(0.4, {16, 1, 1}, Lapse::kFell, Lapse::kLostWay)),
             "feedback: on the usual gain the creature falls, it stays up where effort is 16 times as dear as usual, but makes 80 % of the "
             "clip's way and drifts 2.5 % L a cycle");

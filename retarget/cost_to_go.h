@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "retarget/nominal_path.h"
+#include "retarget/prepare.h"
+#include "retarget/reduced_modes.h"
+
+namespace hydrostat::retarget {
+
+/// What a regulator weighs: squares of mean deviations against squares of muscles, in every control step.
+struct RegulatorOptions {
+  double reach = 0;      // cost to go up to which a deviation is regulated; 0: there is no regulator
+  int modes = 150;
+  double place = 1;      // per L, RMS over the mass
+  double speed = 0.1;    // per sqrt(g L), of the square
+  double effort = 1e-3;  // per squared muscle
+};
+
+/// What a regulator needs to know of a planned motion.
+struct RegulatedMotion {
+  const physics::Scene& scene;
+  const Muscles& muscles;
+  const PreparedTarget& prepared;
+  const NominalPath& path;
+  std::function<void(double time_s, Eigen::VectorXd& activation)> feed_forward;  // E
+  double length = 1;  // L [m]
+};
+
+/// z of a state off its reference, which `heading` has turned from the motion's first period, 2R. length [m] is L, wave_speed [m/s] sqrt(g L).
+Eigen::VectorXd deviation_along(const ReducedModes& modes, const Eigen::Matrix3d& heading, const physics::State& state,
+                                const physics::State& reference, double length, double wave_speed);
+
+/// What a deviation from a planned motion is going to cost until it is gone, its muscles being used as well as they can be: z' S z with z
+/// as LinearStep has it, S a matrix of each control step. It knows which feet will hold when, so that it tells how to put a foot now for
+/// the stance that comes.
+class CostToGo {
+ public:
+  /// S of the time [s].
+  const Eigen::MatrixXf& at(double time_s) const { return costs_[step_at(time_s)]; }
+  /// Of a deviation along the modes at the time [s].
+  double of(const Eigen::VectorXd& deviation, double time_s) const { return deviation.dot(at(time_s).cast<double>() * deviation); }
+  const ReducedModes& modes() const { return modes_; }
+  /// False where a matrix was no number: there is no regulator for such a motion.
+  bool is_sound() const { return is_sound_; }
+
+  friend CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const RegulatorOptions& options);
+
+ private:
+  std::size_t step_at(double time_s) const;
+
+  ReducedModes modes_;
+  bool is_loop_ = false, is_sound_ = true;
+  double spacing_s_ = 0;                 // between matrices
+  std::vector<Eigen::MatrixXf> costs_;   // of a period or of the run, 2R x 2R
+};
+
+/// Riccati's recursion, backwards over the control steps: S = Q + F' S1 F - F' S1 G (W + G' S1 G)^-1 G' S1 F. A loop begins a second
+/// ahead, for what lies further off hardly counts; what is played once stands in the end.
+/// Source: Anderson, Moore, "Optimal Control: Linear Quadratic Methods", Prentice Hall, 1990, section 2.4; Bittanti, Colaneri, De Nicolao,
+/// "The periodic Riccati equation", in The Riccati Equation, Springer, 1991.
+CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const RegulatorOptions& options);
+
+}  // namespace hydrostat::retarget

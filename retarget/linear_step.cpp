@@ -1,0 +1,91 @@
+#include "retarget/linear_step.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "retarget/contact_loads.h"
+
+namespace hydrostat::retarget {
+namespace {
+
+constexpr double kNudge = 1e-5;      // of L, or of L a second: over which forces are differentiated
+constexpr double kLevelShare = 0.25; // of a wrong height that the ground takes away in a step
+constexpr double kSoftest = 0.5;     // of a mode's mass that a step has to move at least, however much the mode buckles
+
+Eigen::MatrixXd symmetric(const Eigen::MatrixXd& matrix) { return 0.5 * (matrix + matrix.transpose()); }
+
+}  // namespace
+
+LinearSteps::LinearSteps(const physics::Scene& scene, const Muscles& muscles, const ReducedModes& modes, double length, double step_s)
+    : scene_(scene),
+      muscles_(muscles),
+      modes_(modes),
+      length_(length),
+      speed_unit_(std::sqrt(gravity_unit(scene) * length)),
+      step_s_(step_s),
+      contact_mass_(step_s * step_s * contact_stiffness(scene, length, step_s)),
+      forces_(scene.body) {}
+
+/// By central differences along the modes, so that every kind of force counts with all its terms.
+LinearSteps::Derivatives LinearSteps::derivatives(const PlannedMoment& moment) const {
+  const Eigen::Index modes = modes_.count(), nodes = moment.state.x.cols();
+  const auto force_at = [&](const physics::State& state) {
+    Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, nodes);
+    forces_.add_forces(state, force);
+    return force;
+  };
+  Eigen::MatrixXd by_place(3 * nodes, modes), by_speed(3 * nodes, modes);
+  physics::State ahead = moment.state, behind = moment.state;
+  for (Eigen::Index k = 0; k < modes; ++k) {
+    const auto field = modes_.fields.col(k).reshaped(3, nodes);
+    const double nudge = kNudge * length_ / field.cwiseAbs().maxCoeff();
+    ahead.x = moment.state.x + nudge * field;
+    behind.x = moment.state.x - nudge * field;
+    by_place.col(k) = (force_at(behind) - force_at(ahead)).reshaped() / (2 * nudge);
+    ahead.x = behind.x = moment.state.x;
+    ahead.v = moment.state.v + nudge * field;
+    behind.v = moment.state.v - nudge * field;
+    by_speed.col(k) = (force_at(behind) - force_at(ahead)).reshaped() / (2 * nudge);
+    ahead.v = behind.v = moment.state.v;
+  }
+  return {symmetric(modes_.fields.transpose() * by_place), symmetric(modes_.fields.transpose() * by_speed)};
+}
+
+LinearStep LinearSteps::at(const PlannedMoment& moment) {
+  forces_.set_activation(moment.activation);
+  const auto [stiffness, damping] = derivatives(moment);
+  const Eigen::Index modes = modes_.count();
+  const double h = step_s_, per_second = speed_unit_ / length_;
+  Eigen::MatrixXd held = Eigen::MatrixXd::Zero(modes, modes), level = held;
+  const physics::ContactPoints& points = scene_.contact_points;
+  Eigen::MatrixXd moves(3, modes);
+  for (int p = 0; p < points.count(); ++p) {
+    const ContactState touch = moment.touching[static_cast<std::size_t>(p)];
+    if (touch == ContactState::kOff) continue;
+    moves.setZero();
+    for (int c = 0; c < points.nodes.rows(); ++c) moves += points.weights(c, p) * modes_.fields.middleRows<3>(3 * points.nodes(c, p));
+    const Eigen::RowVectorXd rise = scene_.ground.normal.transpose() * moves;
+    level.noalias() += rise.transpose() * rise;
+    if (touch == ContactState::kStick) held.noalias() += moves.transpose() * moves;
+    else held.noalias() += rise.transpose() * rise;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> system(Eigen::MatrixXd::Identity(modes, modes) + h * damping + h * h * stiffness +
+                                                              contact_mass_ * held);
+  const Eigen::MatrixXd inverse =
+      system.eigenvectors() * system.eigenvalues().cwiseMax(kSoftest).cwiseInverse().asDiagonal() * system.eigenvectors().transpose();
+
+  LinearStep step;
+  step.carry.resize(2 * modes, 2 * modes);
+  step.carry.bottomRightCorner(modes, modes) = inverse;
+  step.carry.bottomLeftCorner(modes, modes).noalias() = inverse * (h * stiffness + (kLevelShare * contact_mass_ / h) * level) / -per_second;
+  step.carry.topRows(modes) = h * per_second * step.carry.bottomRows(modes);
+  step.carry.topLeftCorner(modes, modes).diagonal().array() += 1;
+  const Eigen::MatrixXd push = modes_.fields.transpose() * (forces_.force_per_activation(moment.state.x) * muscles_.fields);
+  step.drive.resize(2 * modes, push.cols());
+  step.drive.bottomRows(modes).noalias() = inverse * ((h / speed_unit_) * push);
+  step.drive.topRows(modes) = h * per_second * step.drive.bottomRows(modes);
+  return step;
+}
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "physics/internal_forces.h"
+#include "retarget/reduced_modes.h"
+
+namespace hydrostat::retarget {
+
+/// What one control step makes of a deviation from a planned motion: z' = carry z + drive w, for the muscles w and z = (places
+/// [per L], speeds [per sqrt(g L)]) along the modes times sqrt(kg).
+struct LinearStep {
+  Eigen::MatrixXd carry;  // 2R x 2R
+  Eigen::MatrixXd drive;  // 2R x muscles
+};
+
+/// Linear steps of one body along its modes. With q and u the deviations of place and speed, K and D the derivatives of the internal
+/// forces and A = 1 + h D + h^2 K + h^2 kc J^T J,
+///
+///   u' = A^-1 (u - h K q - (kc / 4) h Jn^T Jn q + h B w),   q' = q + h u',
+///
+/// where J are the points that touch by plan and Jn their normals: a point that has come down elsewhere stays there, its height is the
+/// ground's. K is the whole derivative: a body tips over its feet by the part that compression adds, and what the Hessian's positive
+/// part alone would tell stands by itself. Modes that buckle faster than a step can follow count as slower ones.
+class LinearSteps {
+ public:
+  /// length [m] is L. Everything must outlive this.
+  LinearSteps(const physics::Scene& scene, const Muscles& muscles, const ReducedModes& modes, double length, double step_s);
+
+  LinearStep at(const PlannedMoment& moment);
+
+ private:
+  struct Derivatives {
+    Eigen::MatrixXd stiffness, damping;  // R x R, symmetric
+  };
+  Derivatives derivatives(const PlannedMoment& moment) const;
+
+  const physics::Scene& scene_;
+  const Muscles& muscles_;
+  const ReducedModes& modes_;
+  const double length_, speed_unit_, step_s_, contact_mass_;
+  physics::InternalForces<3> forces_;
+};
+
+}  // namespace hydrostat::retarget

@@ -1,0 +1,208 @@
+#include "retarget/cost_to_go.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "retarget/contact_loads.h"
+#include "retarget/linear_step.h"
+#include "retarget/muscle_response.h"
+#include "retarget/replay.h"
+#include "tests/retarget/box_performer.h"
+
+namespace hydrostat::retarget::cost_to_go_test {
+namespace {
+
+constexpr double kStep = 1.0 / 120;  // [s]
+
+struct Regulated {
+  Performer performer = make_box_performer();
+  SignalSet signals = signals_of(performer);
+  signal::Synthesiser player{activations(signals)};
+
+  RegulatedMotion motion() {
+    return {performer.scene, performer.muscles, performer.prepared, performer.path,
+            [this](double time_s, Eigen::VectorXd& activation) { player.at(time_s, activation); }, performer.length};
+  }
+  PlannedMoment moment(long step, ContactState touch) {
+    PlannedMoment moment;
+    const MotionCurve curve(performer.prepared.target);
+    curve.at(static_cast<double>(step) * kStep, moment.state.x, moment.state.v);
+    moment.activation.resize(performer.scene.body.edge_count());
+    player.at(static_cast<double>(step) * kStep, moment.activation);
+    moment.touching.assign(static_cast<std::size_t>(performer.scene.contact_points.count()), touch);
+    return moment;
+  }
+};
+
+Eigen::VectorXd random_vector(Eigen::Index size, std::mt19937& random) {
+  Eigen::VectorXd vector(size);
+  std::normal_distribution<double> normal;
+  for (double& value : vector) value = normal(random);
+  return vector;
+}
+
+TEST(ReducedModes, AreOrthonormalByMassAndHaveAllRigidMovesAndAllThatMusclesDo) {
+  Regulated box;
+  const physics::Body& body = box.performer.scene.body;
+  const std::vector<PlannedMoment> moments{box.moment(0, ContactState::kStick), box.moment(10, ContactState::kStick)};
+  const ReducedModes modes = find_reduced_modes(box.performer.scene, box.performer.muscles, moments, box.performer.length, 90);
+  ASSERT_EQ(modes.count(), 90);
+  EXPECT_LE((modes.project * modes.fields - Eigen::MatrixXd::Identity(90, 90)).cwiseAbs().maxCoeff(), 1e-10);
+  const auto lost = [&](const Eigen::VectorXd& move) { return (move - modes.fields * (modes.project * move)).norm() / move.norm(); };
+  for (const PlannedMoment& moment : moments) {
+    for (int c = 0; c < 3; ++c) {
+      Eigen::Matrix3Xd turn = moment.state.x;
+      for (auto point : turn.colwise()) point = Eigen::Vector3d::Unit(c).cross(Eigen::Vector3d(point)).eval();
+      EXPECT_LE(lost(turn.reshaped()), 1e-3) << "turn " << c;
+      EXPECT_LE(lost(Eigen::Vector3d::Unit(c).replicate(body.node_count(), 1)), 1e-4) << "move " << c;
+    }
+  }
+  physics::InternalForces<3> forces(body);
+  forces.set_activation(moments[0].activation);
+  MuscleResponse response(box.performer.scene, box.performer.muscles, 1.0 / 30, contact_stiffness(box.performer.scene, box.performer.length, 1.0 / 30),
+                          Eigen::VectorXd::Ones(3 * body.node_count()));
+  ASSERT_TRUE(response.update(moments[0].state, forces, moments[0].touching, 1));
+  for (const auto muscle : response.velocities().colwise()) EXPECT_LE(lost(muscle), 0.1);
+}
+
+/// Of all modes and in the air a linear step is what the implicit integrator makes of a small difference.
+TEST(LinearSteps, AreTheDerivativeOfAStepInTheAir) {
+  Regulated box;
+  const physics::Body& body = box.performer.scene.body;
+  const double length = box.performer.length, wave_speed = std::sqrt(9.81 * length), h = kStep / 512;
+  const PlannedMoment moment = box.moment(3, ContactState::kOff);
+  const Eigen::VectorXd root_mass = body.mass.transpose().replicate<3, 1>().reshaped().cwiseSqrt();
+  const ReducedModes modes{Eigen::MatrixXd(root_mass.cwiseInverse().asDiagonal()), Eigen::MatrixXd(root_mass.asDiagonal())};
+  const LinearStep step = LinearSteps(box.performer.scene, box.performer.muscles, modes, length, h).at(moment);
+  physics::Scene flying = box.performer.scene;
+  flying.has_ground = false;
+  const auto stepped = [&](physics::State state, const Eigen::VectorXd& muscles) {
+    const auto stepper = physics::make_implicit_stepper<3>(flying);
+    physics::Impulses impulses = physics::make_impulses(flying);
+    const Eigen::VectorXd activation = moment.activation + box.performer.muscles.fields * muscles;
+    EXPECT_EQ(stepper->step(h, activation, nullptr, state, impulses), physics::Termination::kDone);
+    return state;
+  };
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(box.performer.muscles.fields.cols());
+  const physics::State planned = stepped(moment.state, none);
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    physics::State state = moment.state;
+    state.x += 1e-6 * random_vector(3 * body.node_count(), random).reshaped(3, body.node_count());
+    state.v += 1e-4 * random_vector(3 * body.node_count(), random).reshaped(3, body.node_count());
+    const Eigen::VectorXd muscles = 1e-4 * random_vector(none.size(), random);
+    const auto along = [&](const physics::State& one, const physics::State& other) {
+      return deviation_along(modes, Eigen::Matrix3d::Identity(), one, other, length, wave_speed);
+    };
+    const Eigen::VectorXd expected = along(stepped(state, muscles), planned);
+    const Eigen::VectorXd told = step.carry * along(state, moment.state) + step.drive * muscles;
+    EXPECT_LE((told - expected).norm(), 0.03 * expected.norm());
+  }
+}
+
+/// What is promised is what the best muscles come to: of any others the next cost and the step's own are together more.
+TEST(CostToGo, IsTheLeastThatADeviationComesTo) {
+  Regulated box;
+  RegulatorOptions options;
+  options.modes = 60;
+  const CostToGo cost = find_cost_to_go(box.motion(), kStep, options);
+  ASSERT_TRUE(cost.is_sound());
+  ASSERT_EQ(cost.modes().count(), 60);
+  LinearSteps steps(box.performer.scene, box.performer.muscles, cost.modes(), box.performer.length, kStep);
+  const double mass = box.performer.scene.body.mass.sum();
+  const long period = std::lround(box.performer.prepared.target.duration_s() / kStep);
+  for (const long k : {0L, period / 3, period - 2}) {
+    SCOPED_TRACE("step " + std::to_string(k));
+    const LinearStep step = steps.at([&] {
+      PlannedMoment moment = box.moment(k, ContactState::kStick);
+      box.player.at((static_cast<double>(k) + 0.5) * kStep, moment.activation);
+      return moment;
+    }());
+    const double now_s = static_cast<double>(k) * kStep;
+    const Eigen::MatrixXd next = cost.at(now_s + kStep).cast<double>();
+    Eigen::MatrixXd left = step.drive.transpose() * next * step.drive;
+    left.diagonal().array() += options.effort;
+    for (unsigned seed = 0; seed < 10; ++seed) {
+      std::mt19937 random(seed);
+      const Eigen::VectorXd z = 0.01 * random_vector(120, random);
+      const double here = (options.place * z.head(60).squaredNorm() + options.speed * z.tail(60).squaredNorm()) / mass;
+      const auto comes_to = [&](const Eigen::VectorXd& muscles) {
+        return here + options.effort * muscles.squaredNorm() + cost.of(step.carry * z + step.drive * muscles, now_s + kStep);
+      };
+      const Eigen::VectorXd best = -left.ldlt().solve(step.drive.transpose() * (next * (step.carry * z)));
+      EXPECT_NEAR(comes_to(best), cost.of(z, now_s), 2e-3 * cost.of(z, now_s));
+      EXPECT_GT(comes_to(best + 0.1 * best.norm() * random_vector(best.size(), random).normalized()), cost.of(z, now_s));
+      EXPECT_GT(cost.of(z, now_s), here);
+    }
+  }
+}
+
+TEST(CostToGo, OfALoopReturnsAndOfAOneShotStands) {
+  Regulated box;
+  RegulatorOptions options;
+  options.modes = 30;
+  const CostToGo loop = find_cost_to_go(box.motion(), kStep, options);
+  const double period = box.performer.prepared.target.duration_s();
+  EXPECT_EQ(loop.at(0.3 * period), loop.at(2.3 * period));
+  box.performer.prepared.target.loop = false;
+  const CostToGo once = find_cost_to_go(box.motion(), kStep, options);
+  EXPECT_EQ(once.at(period), once.at(5 * period));
+  EXPECT_NE(once.at(0), once.at(period));
+}
+
+/// The same deviation in a world that is turned about the vertical is answered by the same muscles.
+TEST(Regulate, DoesNotHangOnWhereTheMotionHeads) {
+  Regulated box;
+  const CostToGo cost = find_cost_to_go(box.motion(), kStep, {});
+  CorrectorOptions options;
+  options.regulator.reach = 1;
+  options.horizon_s = kStep;
+  const PlannedMoment moment = box.moment(2, ContactState::kStick);
+  ContactNow contact;
+  contact.touching = moment.touching;
+  contact.bearing.assign(moment.touching.size(), false);
+  contact.on_leg = contact.bearing;
+  contact.force.setZero(3, box.performer.scene.contact_points.count());
+  std::mt19937 random(5);
+  physics::State seen = moment.state;
+  seen.x += 1e-3 * random_vector(seen.x.size(), random).reshaped(3, seen.x.cols());
+  const auto muscles_at = [&](double yaw) {
+    const Eigen::Matrix3d heading = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    Corrector corrector(box.performer.scene, box.performer.muscles, box.performer.length, 0.3, options);
+    Eigen::VectorXd activation = moment.activation;
+    const auto turned = [&](const physics::State& state) { return physics::State{heading * state.x, heading * state.v}; };
+    corrector.regulate(cost, 2 * kStep, heading, turned(seen), turned(moment.state), contact, activation);
+    return Eigen::VectorXd(corrector.muscles_now());
+  };
+  const Eigen::VectorXd ahead = muscles_at(0);
+  ASSERT_GT(ahead.norm(), 1e-4);
+  for (const double yaw : {0.7, -2.0, 3.0}) EXPECT_LE((muscles_at(yaw) - ahead).norm(), 1e-6 * ahead.norm()) << yaw;
+}
+
+/// A body of other mass, friction and stiffness is pushed: it comes back as near to the plan as by the corrector, by nothing but muscles.
+TEST(Regulator, HoldsAPushedBodyAsNearToThePlanAsTheCorrectorAndPushesNothingFromOutside) {
+  Regulated box;
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    PerformOptions options;
+    options.replay.duration_s = 1;
+    options.baselines = false;
+    options.seed = seed;
+    options.variation = 0.1;
+    options.replay.pushes.push_back({0.2, 0, 0.1 * Eigen::Vector3d(std::cos(seed), 0, std::sin(seed))});
+    const ReplayReport usual = perform(box.performer, box.signals, options).main().report;
+    options.feedback.regulator = 1;
+    const ReplayReport regulated = perform(box.performer, box.signals, options).main().report;
+    EXPECT_FALSE(regulated.fell);
+    EXPECT_LT(regulated.shape_rms_length, 1.2 * usual.shape_rms_length);
+    EXPECT_GT(regulated.correction_rms, usual.correction_rms) << "it was not the corrector that acted";
+    EXPECT_LE(regulated.momentum_residual_mg, 1e-6);
+    EXPECT_LE(regulated.angular_residual_mgl, 1e-6);
+    EXPECT_EQ(regulated.external_assist_mg, 0);
+  }
+}
+
+}  // namespace
+}  // namespace hydrostat::retarget::cost_to_go_test

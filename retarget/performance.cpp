@@ -17,8 +17,8 @@ constexpr double kOffTravel = 0.08;    // of it, more or less, from which its wa
 constexpr double kOffDrift = 0.04;     // likewise of drift a cycle: measured, what is well drifts by 1.3 % at most, what staggers by 5 % and more
 constexpr double kLeastCycles = 4;     // of a loop, which tell its drift
 constexpr double kCircle = 10 * M_PI / 180;  // by which a clip turns before its way ends elsewhere than it led to
-// Tried in this order. The regulator keeps nearest to the path, of what goes astray by accident, too, where it leaves that to the corrector;
-// on some bodies that loses what the regulator alone would hold. It is made anew for each run, which costs time. The quick ones keep bodies up whose feet slide under the usual gain; pushes they recover from less often.
+// Tried in this order. The regulator keeps nearest to the path; where it leaves large errors to the corrector more pushes are recovered, but
+// some bodies are lost that it holds alone. The quick ones keep bodies up whose feet slide under the usual gain.
 constexpr Feedback kOthers[] = {{},
                                 {.regulator = 1e-3},
                                 {.regulator = 1},

@@ -9,7 +9,7 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kNudge = 1e-5;      // of L, or of L a second: over which forces are differentiated
+constexpr double kNudge = 1e-5;      // of L, over which forces are differentiated
 constexpr double kLevelShare = 0.25; // of a wrong height that the ground takes away in a step
 constexpr double kSoftest = 0.5;     // of a mode's mass that a step has to move at least, however much the mode buckles
 
@@ -25,30 +25,26 @@ LinearSteps::LinearSteps(const physics::Scene& scene, const Muscles& muscles, co
       speed_unit_(std::sqrt(gravity_unit(scene) * length)),
       step_s_(step_s),
       contact_mass_(step_s * step_s * contact_stiffness(scene, length, step_s)),
-      forces_(scene.body) {}
+      forces_(scene.body),
+      dashpots_(scene.body) {}
 
-/// By central differences along the modes, so that every kind of force counts with all its terms.
-LinearSteps::Derivatives LinearSteps::derivatives(const PlannedMoment& moment) const {
+/// Of places by central differences along the modes, so that every kind of force counts with all its terms.
+LinearSteps::Derivatives LinearSteps::derivatives(const PlannedMoment& moment) {
   const Eigen::Index modes = modes_.count(), nodes = moment.state.x.cols();
-  const auto force_at = [&](const physics::State& state) {
+  const auto force_at = [&](const Eigen::Matrix3Xd& x) {
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, nodes);
-    forces_.add_forces(state, force);
+    forces_.add_forces({x, moment.state.v}, force);
     return force;
   };
-  Eigen::MatrixXd by_place(3 * nodes, modes), by_speed(3 * nodes, modes);
-  physics::State ahead = moment.state, behind = moment.state;
+  Eigen::MatrixXd by_place(3 * nodes, modes);
   for (Eigen::Index k = 0; k < modes; ++k) {
     const auto field = modes_.fields.col(k).reshaped(3, nodes);
     const double nudge = kNudge * length_ / field.cwiseAbs().maxCoeff();
-    ahead.x = moment.state.x + nudge * field;
-    behind.x = moment.state.x - nudge * field;
-    by_place.col(k) = (force_at(behind) - force_at(ahead)).reshaped() / (2 * nudge);
-    ahead.x = behind.x = moment.state.x;
-    ahead.v = moment.state.v + nudge * field;
-    behind.v = moment.state.v - nudge * field;
-    by_speed.col(k) = (force_at(behind) - force_at(ahead)).reshaped() / (2 * nudge);
-    ahead.v = behind.v = moment.state.v;
+    by_place.col(k) = (force_at(moment.state.x - nudge * field) - force_at(moment.state.x + nudge * field)).reshaped() / (2 * nudge);
   }
+  dashpots_.set_zero();
+  dashpots_.add_damping(scene_.body, moment.state.x, 1);
+  const Eigen::MatrixXd by_speed = dashpots_.lower().selfadjointView<Eigen::Lower>() * modes_.fields;
   return {symmetric(modes_.fields.transpose() * by_place), symmetric(modes_.fields.transpose() * by_speed)};
 }
 

@@ -33,13 +33,14 @@ class LinearSteps {
   struct Derivatives {
     Eigen::MatrixXd stiffness, damping;  // R x R, symmetric
   };
-  Derivatives derivatives(const PlannedMoment& moment) const;
+  Derivatives derivatives(const PlannedMoment& moment);
 
   const physics::Scene& scene_;
   const Muscles& muscles_;
   const ReducedModes& modes_;
   const double length_, speed_unit_, step_s_, contact_mass_;
   physics::InternalForces<3> forces_;
+  physics::SystemMatrix dashpots_;
 };
 
 }  // namespace hydrostat::retarget

@@ -155,8 +155,9 @@ TEST(CostToGo, OfALoopReturnsAndOfAOneShotStands) {
 /// The same deviation in a world that is turned about the vertical is answered by the same muscles.
 TEST(Regulate, DoesNotHangOnWhereTheMotionHeads) {
   Regulated box;
-  const CostToGo cost = find_cost_to_go(box.motion(), kStep, {});
   CorrectorOptions options;
+  options.regulator.modes = 60;
+  const CostToGo cost = find_cost_to_go(box.motion(), kStep, options.regulator);
   options.regulator.reach = 1;
   options.horizon_s = kStep;
   const PlannedMoment moment = box.moment(2, ContactState::kStick);
@@ -194,6 +195,7 @@ TEST(Regulator, HoldsAPushedBodyAsNearToThePlanAsTheCorrectorAndPushesNothingFro
     options.replay.pushes.push_back({0.2, 0, 0.1 * Eigen::Vector3d(std::cos(seed), 0, std::sin(seed))});
     const ReplayReport usual = perform(box.performer, box.signals, options).main().report;
     options.feedback.regulator = 1;
+    options.replay.corrector.regulator.modes = 60;
     const ReplayReport regulated = perform(box.performer, box.signals, options).main().report;
     EXPECT_FALSE(regulated.fell);
     EXPECT_LT(regulated.shape_rms_length, 1.2 * usual.shape_rms_length);

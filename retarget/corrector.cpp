@@ -11,7 +11,7 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kUsualHorizon = 1.0 / 30;  // [s] whatever the usual one is, contact is as stiff
+constexpr double kContactTime = 1.0 / 30;  // [s] for which contact is as stiff as the usual gain wants it, whatever its horizon
 constexpr double kLedFoot = 3;  // times as much weighs a foot on uneven ground, where it is to be put in a place
 
 /// 3N: the squared weight of each row of nodes.
@@ -35,7 +35,7 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
       length_(length),
       speed_unit_(std::sqrt(gravity_unit(scene) * length)),
       limit_(limit),
-      contact_stiffness_(contact_stiffness(scene, length, options.regulator.reach > 0 ? options.horizon_s : kUsualHorizon)),
+      contact_stiffness_(contact_stiffness(scene, length, options.regulator.reach > 0 ? options.horizon_s : kContactTime)),
       node_shares_(shares_of_nodes(scene.body, options.node_weight / speed_unit_)),
       responses_(scene, muscles, options.horizon_s, contact_stiffness_, node_shares_),
       forces_(scene.body) {

@@ -70,7 +70,7 @@ class Corrector {
   double regulate(const CostToGo& cost, double time_s, const Eigen::Matrix3d& heading, const physics::State& state,
                   const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation);
   void reset();
-  /// What acted in its stead.
+  /// What acted in its stead, of each muscle.
   void follow(const Eigen::VectorXd& muscles) { previous_ = muscles; }
   const Eigen::VectorXd& muscles_now() const { return previous_; }
   /// How far inside their cones the forces at bearing points stay over the horizon, by the last correction's own model [m

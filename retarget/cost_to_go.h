@@ -11,13 +11,13 @@
 
 namespace hydrostat::retarget {
 
-/// What a regulator weighs: squares of mean deviations against squares of muscles, in every control step.
+/// What a regulator weighs in every control step: factors on the squares of deviations, RMS over the mass, and of muscles.
 struct RegulatorOptions {
   double reach = 0;      // cost to go up to which a deviation is regulated; 0: there is no regulator
-  int modes = 150;
-  double place = 1;      // per L, RMS over the mass
-  double speed = 0.1;    // per sqrt(g L), of the square
-  double effort = 1e-3;  // per squared muscle
+  int modes = 150;       // at most
+  double place = 1;      // on that of a place [per L]
+  double speed = 0.1;    // on that of a speed [per sqrt(g L)]
+  double effort = 1e-3;  // on the sum of squared muscles [-]
 };
 
 /// What a regulator needs to know of a planned motion.

@@ -36,8 +36,8 @@ struct Slope {
   }
 };
 
-/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; "regulator=0.001:cost=1e-4"; of the ground: "slope=5:side=90"; or of the
-/// control mesh: "lod=52", as replay has it, with other feedback where it falls or loses its way. The creature's own feedback is factors
+/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; "regulator=0.001:cost=1e-4"; of the
+/// ground: "slope=5:side=90"; or of the control mesh: "lod=52", as replay has it, with other feedback where it falls or loses its way. The creature's own feedback is factors
 /// on all that.
 void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Slope& slope, double& nodes) {
   retarget::CorrectorOptions& options = replay.corrector;

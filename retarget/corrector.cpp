@@ -44,6 +44,8 @@ Corrector::Corrector(const physics::Scene& scene, const Muscles& muscles, double
 
 void Corrector::reset() {
   previous_.setZero();
+  predicted_.resize(0);
+  disturbance_.resize(0);
   responses_.forget();
 }
 
@@ -190,23 +192,46 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
   return act(left, right, activation);
 }
 
+/// What the last prediction has missed, for the coming one, where a regulator was at work in the step before.
+void Corrector::learn_disturbance(const Eigen::VectorXd& deviation) {
+  const RegulatorOptions& options = options_.regulator;
+  if (disturbance_.size() == 0) disturbance_.setZero(deviation.size());
+  disturbance_ *= options.keep;
+  if (predicted_.size() > 0) disturbance_ += options.learn * (deviation - predicted_);
+}
+
 double Corrector::regulate(const CostToGo& cost, double time_s, const Eigen::Matrix3d& heading, const physics::State& state,
                            const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation) {
+  learn_disturbance(deviation_along(cost.modes(), heading, state, reference, length_, speed_unit_));
+  predicted_.resize(0);
   if (!begin(state, reference, contact, activation, 1)) return 0;
   find_cones(contact);
-  const Eigen::Index muscles = muscles_.fields.cols(), modes = cost.modes().count();
+  const Eigen::Index modes = cost.modes().count();
+  const double step = options_.horizon_s * speed_unit_ / length_, next_s = time_s + options_.horizon_s;
   const Eigen::MatrixXd project = turned(cost.modes().project, heading);
-  const double h = options_.horizon_s;
-  Eigen::MatrixXd after(2 * modes, muscles + 1);  // z by each muscle, and without any
-  after.bottomLeftCorner(modes, muscles).noalias() = project * responses_.velocities() / speed_unit_;
-  after.bottomRightCorner(modes, 1).noalias() = project * deviation_ / speed_unit_;
-  after.topRows(modes) = (h * speed_unit_ / length_) * after.bottomRows(modes);
-  after.topRightCorner(modes, 1).noalias() += project * (state.x - reference.x).reshaped() / length_;
-  const Eigen::MatrixXd weighed = cost.at(time_s + h).cast<double>() * after;
-  const auto by_muscles = after.leftCols(muscles).transpose();
-  Eigen::MatrixXd left = by_muscles * weighed.leftCols(muscles);
+  const Eigen::MatrixXd speeds = project * responses_.velocities() / speed_unit_;  // by each muscle; places go with them
+  Eigen::VectorXd free(2 * modes);                                                 // z by no muscle
+  free.tail(modes) = project * deviation_ / speed_unit_;
+  free.head(modes) = step * free.tail(modes) + project * (state.x - reference.x).reshaped() / length_;
+  free += disturbance_;
+
+  const auto [of_speeds, with_step] = by_step(cost.at(next_s).cast<double>(), step);
+  const Eigen::VectorXd lasting = options_.regulator.last * (cost.at_disturbed(next_s).cast<double>() * disturbance_);
+  const Eigen::VectorXd pull = with_step.transpose() * free + step * lasting.head(modes) + lasting.tail(modes);
+  Eigen::MatrixXd left(speeds.cols(), speeds.cols());
+  left.triangularView<Eigen::Lower>() = speeds.transpose() * (of_speeds * speeds).eval();
   left.diagonal().array() += options_.regulator.effort;
-  return act(left, -by_muscles * weighed.col(muscles), activation);
+  const double rms = act(left, -speeds.transpose() * pull, activation);
+  predicted_ = free;
+  predicted_.tail(modes) += speeds * previous_;
+  predicted_.head(modes) += step * (speeds * previous_);
+  return rms;
+}
+
+void Corrector::follow(const Eigen::VectorXd& muscles) {
+  previous_ = muscles;
+  predicted_.resize(0);
+  disturbance_ *= options_.regulator.keep;
 }
 
 }  // namespace hydrostat::retarget

@@ -56,6 +56,8 @@ struct ContactNow {
 ///
 /// Where a cost to go is known, regulate() takes the place of that target: min_w z' S z + effort |w|^2 + the excess over cones, of
 /// the deviation z after one control step (horizon_s), by the same response, so that what touches counts as it is and not as planned.
+/// What such steps turn out to miss is taken for a disturbance that lasts a while: of another body, of what the plan left out. Source:
+/// Muske, Badgwell, "Disturbance modeling for offset-free linear model predictive control", Journal of Process Control 12, 2002.
 class Corrector {
  public:
   /// length [m] is L. Scene and muscles must outlive the corrector.
@@ -71,7 +73,7 @@ class Corrector {
                   const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation);
   void reset();
   /// What acted in its stead, of each muscle.
-  void follow(const Eigen::VectorXd& muscles) { previous_ = muscles; }
+  void follow(const Eigen::VectorXd& muscles);
   const Eigen::VectorXd& muscles_now() const { return previous_; }
   /// How far inside their cones the forces at bearing points stay over the horizon, by the last correction's own model [m
   /// g]; negative outside, 0 where nothing bears.
@@ -85,6 +87,7 @@ class Corrector {
   std::vector<bool> held_to_cones(const ContactNow& contact) const;
   bool begin(const physics::State& state, const physics::State& reference, const ContactNow& contact, const Eigen::VectorXd& activation,
              int response_every);
+  void learn_disturbance(const Eigen::VectorXd& deviation);
   void find_cones(const ContactNow& contact);
   double act(const Eigen::MatrixXd& left, const Eigen::VectorXd& right, Eigen::VectorXd& activation);
 
@@ -101,6 +104,7 @@ class Corrector {
   double haste_ = 0;               // 0 where that is no long step, 1 from twice a long one on
   Eigen::MatrixXd weighted_, normal_, cones_;  // weighted_: the few rows beside the nodes', x (muscles + 1)
   Eigen::VectorXd previous_;
+  Eigen::VectorXd predicted_, disturbance_;  // 2R: z after a regulator's last step, and what it is found off by; none before the first
   Eigen::Matrix3Xd force_, reference_force_;
 };
 

@@ -63,14 +63,34 @@ class Moments {
   const double step_s_;
 };
 
-/// S one step earlier.
-void go_back(const LinearStep& step, const Eigen::VectorXd& weights, double effort, Eigen::MatrixXd& cost) {
-  const Eigen::MatrixXd driven = cost * step.drive, carried = cost * step.carry;
-  Eigen::MatrixXd left = step.drive.transpose() * driven;
-  left.diagonal().array() += effort;
-  const Eigen::MatrixXd coupled = step.carry.transpose() * driven;
-  cost.noalias() = step.carry.transpose() * carried;
-  cost.noalias() -= coupled * left.ldlt().solve(coupled.transpose());
+/// S and T, see find_cost_to_go.
+struct Costs {
+  Eigen::MatrixXd of_deviation, of_disturbance;
+};
+
+/// One step earlier.
+void go_back(const LinearStep& step, const Eigen::VectorXd& weights, const RegulatorOptions& options, Costs& costs) {
+  Eigen::MatrixXd& cost = costs.of_deviation;
+  const Eigen::Index modes = step.drive.rows();
+  const CostByStep next = by_step(cost, step.advance);
+  Eigen::MatrixXd carried = step.carry.transpose() * next.of_speeds;  // 2R x R: F^T S P
+  carried.topRows(modes) += next.with_step.topRows(modes);
+  Eigen::MatrixXd left = step.drive.transpose() * next.of_speeds * step.drive;
+  left.diagonal().array() += options.effort;
+  const Eigen::MatrixXd coupled = carried * step.drive, gains = left.ldlt().solve(coupled.transpose());
+
+  const Eigen::MatrixXd ahead = cost + options.last * costs.of_disturbance;
+  const Eigen::MatrixXd ahead_by_step = step.advance * ahead.topRows(modes) + ahead.bottomRows(modes);  // R x 2R: P^T ahead
+  costs.of_disturbance.noalias() = (step.carry.transpose() - gains.transpose() * step.drive.transpose()) * ahead_by_step;
+  costs.of_disturbance.topRows(modes) += ahead.topRows(modes);
+
+  const Eigen::MatrixXd by_place = next.with_step.topRows(modes) * step.carry;  // R x 2R
+  const Eigen::MatrixXd of_places = cost.topLeftCorner(modes, modes);
+  cost.noalias() = step.carry.transpose() * (next.of_speeds * step.carry);
+  cost.topRows(modes) += by_place;
+  cost.leftCols(modes) += by_place.transpose();
+  cost.topLeftCorner(modes, modes) += of_places;
+  cost.noalias() -= coupled * gains;
   cost = (0.5 * (cost + cost.transpose())).eval();
   cost.diagonal() += weights;
 }
@@ -84,6 +104,14 @@ Eigen::MatrixXd into_next_period(const ReducedModes& modes, double yaw) {
 }
 
 }  // namespace
+
+CostByStep by_step(const Eigen::MatrixXd& cost, double advance) {
+  const Eigen::Index modes = cost.rows() / 2;
+  CostByStep result;
+  result.with_step = advance * cost.leftCols(modes) + cost.rightCols(modes);
+  result.of_speeds = advance * result.with_step.topRows(modes) + result.with_step.bottomRows(modes);
+  return result;
+}
 
 std::size_t CostToGo::step_at(double time_s) const {
   const long count = static_cast<long>(costs_.size()), step = std::lround(time_s / spacing_s_);
@@ -107,6 +135,7 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
   const long steps = moments.steps(), apart = (steps + kMostMatrices - 1) / kMostMatrices, count = (steps + apart - 1) / apart;
   result.spacing_s_ = static_cast<double>(apart) * moments.step_s();
   result.costs_.resize(static_cast<std::size_t>(count));
+  result.disturbed_.resize(result.costs_.size());
   LinearSteps linear(motion.scene, motion.muscles, result.modes_, motion.length, moments.step_s());
 
   const double mass = motion.scene.body.mass.sum();
@@ -114,30 +143,41 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
   Eigen::VectorXd weights(2 * modes);
   weights.head(modes).setConstant(options.place / mass);
   weights.tail(modes).setConstant(options.speed / mass);
-  Eigen::MatrixXd cost = (kEndWeight * weights).asDiagonal();
+  Costs costs{(kEndWeight * weights).asDiagonal(), Eigen::MatrixXd::Zero(2 * modes, 2 * modes)};
   const long ahead = std::lround(kForgotten / moments.step_s());
   const Eigen::MatrixXd turn = into_next_period(result.modes_, target.loop ? target.yaw : 0);
   const auto pass_seam = [&] {
     if (!target.loop || target.yaw == 0) return;
-    for (const Eigen::Index r : {Eigen::Index{0}, modes}) {
-      cost.middleRows(r, modes) = (turn.transpose() * cost.middleRows(r, modes)).eval();
-      cost.middleCols(r, modes) = (cost.middleCols(r, modes) * turn).eval();
+    for (Eigen::MatrixXd* cost : {&costs.of_deviation, &costs.of_disturbance}) {
+      for (const Eigen::Index r : {Eigen::Index{0}, modes}) {
+        cost->middleRows(r, modes) = (turn.transpose() * cost->middleRows(r, modes)).eval();
+        cost->middleCols(r, modes) = (cost->middleCols(r, modes) * turn).eval();
+      }
     }
+  };
+  std::vector<LinearStep> known(static_cast<std::size_t>(target.loop && steps <= ahead ? steps : 0));  // a short loop comes by again and again
+  const auto step_at = [&](long k) {
+    if (known.empty()) return linear.at(moments.at(k));
+    LinearStep& step = known[static_cast<std::size_t>(k)];
+    if (step.carry.size() == 0) step = linear.at(moments.at(k));
+    return step;
   };
   if (target.loop) {
     for (long k = ahead - 1; k >= 0; --k) {
-      go_back(linear.at(moments.at(k % steps)), weights, options.effort, cost);
+      go_back(step_at(k % steps), weights, options, costs);
       if (k % steps == 0) pass_seam();
     }
   } else {
     const LinearStep standing = linear.at(moments.at(steps));
-    for (long k = 0; k < ahead; ++k) go_back(standing, weights, options.effort, cost);
+    for (long k = 0; k < ahead; ++k) go_back(standing, weights, options, costs);
   }
   for (long k = steps - 1; k >= 0; --k) {
-    go_back(linear.at(moments.at(k)), weights, options.effort, cost);
-    if (k % apart == 0) result.costs_[static_cast<std::size_t>(k / apart)] = cost.cast<float>();
+    go_back(step_at(k), weights, options, costs);
+    if (k % apart != 0) continue;
+    result.costs_[static_cast<std::size_t>(k / apart)] = costs.of_deviation.cast<float>();
+    result.disturbed_[static_cast<std::size_t>(k / apart)] = costs.of_disturbance.cast<float>();
   }
-  result.is_sound_ = cost.allFinite();
+  result.is_sound_ = costs.of_deviation.allFinite() && costs.of_disturbance.allFinite();
   return result;
 }
 

@@ -18,6 +18,9 @@ struct RegulatorOptions {
   double place = 1;      // on that of a place [per L]
   double speed = 0.1;    // on that of a speed [per sqrt(g L)]
   double effort = 1e-3;  // on the sum of squared muscles [-]
+  double learn = 0.3;    // share of what a step's end was off its prediction that counts as a disturbance of the next
+  double keep = 0.7;     // of a disturbance from step to step, as it is learned
+  double last = 0.5;     // and as the muscles meet it
 };
 
 /// What a regulator needs to know of a planned motion.
@@ -41,6 +44,8 @@ class CostToGo {
  public:
   /// S of the time [s].
   const Eigen::MatrixXf& at(double time_s) const { return costs_[step_at(time_s)]; }
+  /// Of a disturbance d that lasts (RegulatorOptions::last), beside that: the cost is z' S z + 2 z' at_disturbed d + what z does not change.
+  const Eigen::MatrixXf& at_disturbed(double time_s) const { return disturbed_[step_at(time_s)]; }
   /// Of a deviation along the modes at the time [s].
   double of(const Eigen::VectorXd& deviation, double time_s) const { return deviation.dot(at(time_s).cast<double>() * deviation); }
   const ReducedModes& modes() const { return modes_; }
@@ -54,11 +59,21 @@ class CostToGo {
 
   ReducedModes modes_;
   bool is_loop_ = false, is_sound_ = true;
-  double spacing_s_ = 0;                 // between matrices
-  std::vector<Eigen::MatrixXf> costs_;   // of a period or of the run, 2R x 2R
+  double spacing_s_ = 0;                            // between matrices
+  std::vector<Eigen::MatrixXf> costs_, disturbed_;  // of a period or of the run, 2R x 2R
 };
 
-/// Riccati's recursion, backwards over the control steps: S = Q + F' S1 F - F' S1 G (W + G' S1 G)^-1 G' S1 F. A loop begins a second
+/// What of S, 2R x 2R, counts where only a step's speeds u' are free and its places follow: with P = (a 1, 1), z' = (q, 0) + P u'.
+struct CostByStep {
+  Eigen::MatrixXd of_speeds;  // R x R: P^T S P
+  Eigen::MatrixXd with_step;  // 2R x R: S P
+};
+
+/// `advance` is a, the step in units of L / sqrt(g L).
+CostByStep by_step(const Eigen::MatrixXd& cost, double advance);
+
+/// Riccati's recursion, backwards over the control steps: S = Q + F' S1 F - F' S1 G (W + G' S1 G)^-1 G' S1 F, and T = C' (S1 + r T1) for
+/// a disturbance of each step's end, that is r times as large in the next, with the closed loop C. A loop begins a second
 /// ahead, for what lies further off hardly counts; what is played once stands in the end.
 /// Source: Anderson, Moore, "Optimal Control: Linear Quadratic Methods", Prentice Hall, 1990, section 2.4; Bittanti, Colaneri, De Nicolao,
 /// "The periodic Riccati equation", in The Riccati Equation, Springer, 1991.

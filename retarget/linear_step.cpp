@@ -17,6 +17,14 @@ Eigen::MatrixXd symmetric(const Eigen::MatrixXd& matrix) { return 0.5 * (matrix 
 
 }  // namespace
 
+Eigen::VectorXd LinearStep::after(const Eigen::VectorXd& z, const Eigen::VectorXd& muscles) const {
+  const Eigen::Index modes = drive.rows();
+  Eigen::VectorXd result(2 * modes);
+  result.tail(modes) = carry * z + drive * muscles;
+  result.head(modes) = z.head(modes) + advance * result.tail(modes);
+  return result;
+}
+
 LinearSteps::LinearSteps(const physics::Scene& scene, const Muscles& muscles, const ReducedModes& modes, double length, double step_s)
     : scene_(scene),
       muscles_(muscles),
@@ -70,17 +78,13 @@ LinearStep LinearSteps::at(const PlannedMoment& moment) {
                                                               contact_mass_ * held);
   const Eigen::MatrixXd inverse =
       system.eigenvectors() * system.eigenvalues().cwiseMax(kSoftest).cwiseInverse().asDiagonal() * system.eigenvectors().transpose();
-
   LinearStep step;
-  step.carry.resize(2 * modes, 2 * modes);
-  step.carry.bottomRightCorner(modes, modes) = inverse;
-  step.carry.bottomLeftCorner(modes, modes).noalias() = inverse * (h * stiffness + (kLevelShare * contact_mass_ / h) * level) / -per_second;
-  step.carry.topRows(modes) = h * per_second * step.carry.bottomRows(modes);
-  step.carry.topLeftCorner(modes, modes).diagonal().array() += 1;
+  step.advance = h * per_second;
+  step.carry.resize(modes, 2 * modes);
+  step.carry.rightCols(modes) = inverse;
+  step.carry.leftCols(modes).noalias() = inverse * (h * stiffness + (kLevelShare * contact_mass_ / h) * level) / -per_second;
   const Eigen::MatrixXd push = modes_.fields.transpose() * (forces_.force_per_activation(moment.state.x) * muscles_.fields);
-  step.drive.resize(2 * modes, push.cols());
-  step.drive.bottomRows(modes).noalias() = inverse * ((h / speed_unit_) * push);
-  step.drive.topRows(modes) = h * per_second * step.drive.bottomRows(modes);
+  step.drive.noalias() = inverse * ((h / speed_unit_) * push);
   return step;
 }
 

@@ -7,11 +7,14 @@
 
 namespace hydrostat::retarget {
 
-/// What one control step makes of a deviation from a planned motion: z' = carry z + drive w, for the muscles w and z = (places
-/// [per L], speeds [per sqrt(g L)]) along the modes times sqrt(kg).
+/// What one control step makes of a deviation from a planned motion, for the muscles w and z = (places q [per L], speeds u [per
+/// sqrt(g L)]) along the modes times sqrt(kg): u' = carry z + drive w, q' = q + advance u'.
 struct LinearStep {
-  Eigen::MatrixXd carry;  // 2R x 2R
-  Eigen::MatrixXd drive;  // 2R x muscles
+  Eigen::MatrixXd carry;  // R x 2R
+  Eigen::MatrixXd drive;  // R x muscles
+  double advance = 0;     // the step in units of L / sqrt(g L)
+
+  Eigen::VectorXd after(const Eigen::VectorXd& z, const Eigen::VectorXd& muscles) const;
 };
 
 /// Linear steps of one body along its modes. With q and u the deviations of place and speed, K and D the derivatives of the internal

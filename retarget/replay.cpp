@@ -49,10 +49,14 @@ CorrectorOptions gain_for(const ReplayInput& input, const ReplayOptions& options
   return gain;
 }
 
-/// Of a regulator, that looks ahead by its cost to go, and a control step at a time.
-CorrectorOptions regulated(CorrectorOptions gain, const RegulatorOptions& regulator, double control_s) {
-  gain.regulator = regulator;
-  gain.horizon_s = control_s;
+double control_step(const ReplayOptions& options) { return options.step_s * options.steps_per_control; }
+
+/// Of a regulator, that looks ahead by its cost to go, and a control step at a time. What it predicts is compared with what the body did only
+/// where that is seen as it is.
+CorrectorOptions regulated(CorrectorOptions gain, const ReplayOptions& options) {
+  gain.regulator = options.corrector.regulator;
+  gain.horizon_s = control_step(options);
+  if (!options.observation.is_exact()) gain.regulator.learn = 0;
   return gain;
 }
 
@@ -68,8 +72,6 @@ std::shared_ptr<const CostToGo> cost_for(const ReplayInput& input, const ReplayO
 std::optional<physics::Scene> moving_plant(const ReplayInput& input, const ReplayOptions& options) {
   return options.moves.empty() ? std::nullopt : std::optional(input.scene);
 }
-
-double control_step(const ReplayOptions& options) { return options.step_s * options.steps_per_control; }
 
 /// One free simulation, from control step to control step.
 class Run {
@@ -189,7 +191,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
   const bool is_seen = options.correct && options.observation.is_exact();
   if (is_seen && target_.loop && has_flight(input.prepared)) strength_.emplace(input.model, control_s_);
   if (is_seen) brace_.emplace(input.prepared, input.scene.body, input.scene.gravity.norm());
-  if (cost_) regulator_.emplace(input.model, input.muscles, input.length, input.limit, regulated(gain_, options.corrector.regulator, control_s_));
+  if (cost_) regulator_.emplace(input.model, input.muscles, input.length, input.limit, regulated(gain_, options));
   if (options.lesson) options.lesson->make_room(activation_.size(), state_.x.size(), steps_);
   if (!options.trace) return;
   result_.trace = empty_trace(input.scene.body, steps_ + 1);

@@ -33,7 +33,20 @@ struct Regulated {
     moment.touching.assign(static_cast<std::size_t>(performer.scene.contact_points.count()), touch);
     return moment;
   }
+  /// As the regulator takes it.
+  PlannedMoment planned(long step) {
+    PlannedMoment moment = this->moment(step, ContactState::kStick);
+    player.at((static_cast<double>(step) + 0.5) * kStep, moment.activation);
+    return moment;
+  }
 };
+
+/// 2R x muscles: what muscles make of places and speeds in a step.
+Eigen::MatrixXd whole_drive(const LinearStep& step) {
+  Eigen::MatrixXd drive(2 * step.drive.rows(), step.drive.cols());
+  drive << step.advance * step.drive, step.drive;
+  return drive;
+}
 
 Eigen::VectorXd random_vector(Eigen::Index size, std::mt19937& random) {
   Eigen::VectorXd vector(size);
@@ -97,7 +110,7 @@ TEST(LinearSteps, AreTheDerivativeOfAStepInTheAir) {
       return deviation_along(modes, Eigen::Matrix3d::Identity(), one, other, length, wave_speed);
     };
     const Eigen::VectorXd expected = along(stepped(state, muscles), planned);
-    const Eigen::VectorXd told = step.carry * along(state, moment.state) + step.drive * muscles;
+    const Eigen::VectorXd told = step.after(along(state, moment.state), muscles);
     EXPECT_LE((told - expected).norm(), 0.03 * expected.norm());
   }
 }
@@ -115,27 +128,52 @@ TEST(CostToGo, IsTheLeastThatADeviationComesTo) {
   const long period = std::lround(box.performer.prepared.target.duration_s() / kStep);
   for (const long k : {0L, period / 3, period - 2}) {
     SCOPED_TRACE("step " + std::to_string(k));
-    const LinearStep step = steps.at([&] {
-      PlannedMoment moment = box.moment(k, ContactState::kStick);
-      box.player.at((static_cast<double>(k) + 0.5) * kStep, moment.activation);
-      return moment;
-    }());
+    const LinearStep step = steps.at(box.planned(k));
     const double now_s = static_cast<double>(k) * kStep;
     const Eigen::MatrixXd next = cost.at(now_s + kStep).cast<double>();
-    Eigen::MatrixXd left = step.drive.transpose() * next * step.drive;
+    const Eigen::MatrixXd drive = whole_drive(step);
+    Eigen::MatrixXd left = drive.transpose() * next * drive;
     left.diagonal().array() += options.effort;
     for (unsigned seed = 0; seed < 10; ++seed) {
       std::mt19937 random(seed);
       const Eigen::VectorXd z = 0.01 * random_vector(120, random);
       const double here = (options.place * z.head(60).squaredNorm() + options.speed * z.tail(60).squaredNorm()) / mass;
       const auto comes_to = [&](const Eigen::VectorXd& muscles) {
-        return here + options.effort * muscles.squaredNorm() + cost.of(step.carry * z + step.drive * muscles, now_s + kStep);
+        return here + options.effort * muscles.squaredNorm() + cost.of(step.after(z, muscles), now_s + kStep);
       };
-      const Eigen::VectorXd best = -left.ldlt().solve(step.drive.transpose() * (next * (step.carry * z)));
+      const Eigen::VectorXd best = -left.ldlt().solve(drive.transpose() * (next * step.after(z, Eigen::VectorXd::Zero(drive.cols()))));
       EXPECT_NEAR(comes_to(best), cost.of(z, now_s), 2e-3 * cost.of(z, now_s));
       EXPECT_GT(comes_to(best + 0.1 * best.norm() * random_vector(best.size(), random).normalized()), cost.of(z, now_s));
       EXPECT_GT(cost.of(z, now_s), here);
     }
+  }
+}
+
+/// What a lasting disturbance adds to the cost of a deviation is what the best muscles come to, too.
+TEST(CostToGo, KnowsWhatALastingDisturbanceAdds) {
+  Regulated box;
+  RegulatorOptions options;
+  options.modes = 60;
+  const CostToGo cost = find_cost_to_go(box.motion(), kStep, options);
+  LinearSteps steps(box.performer.scene, box.performer.muscles, cost.modes(), box.performer.length, kStep);
+  const long k = 5;
+  const LinearStep step = steps.at(box.planned(k));
+  const Eigen::MatrixXd next = cost.at((k + 1) * kStep).cast<double>(), beside = options.last * cost.at_disturbed((k + 1) * kStep).cast<double>();
+  const Eigen::MatrixXd drive = whole_drive(step);
+  Eigen::MatrixXd left = drive.transpose() * next * drive;
+  left.diagonal().array() += options.effort;
+  const auto least = [&](const Eigen::VectorXd& z, const Eigen::VectorXd& disturbance) {
+    const Eigen::VectorXd free = step.after(z, Eigen::VectorXd::Zero(drive.cols())) + disturbance;
+    const Eigen::VectorXd muscles = -left.ldlt().solve(drive.transpose() * (next * free + beside * disturbance));
+    const Eigen::VectorXd after = free + drive * muscles;
+    return options.effort * muscles.squaredNorm() + after.dot(next * after) + 2 * after.dot(beside * disturbance);
+  };
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    std::mt19937 random(seed);
+    const Eigen::VectorXd z = 0.01 * random_vector(120, random), none = Eigen::VectorXd::Zero(120);
+    const Eigen::VectorXd disturbance = 0.01 * random_vector(120, random);
+    const double added = least(z, disturbance) - least(z, none) - least(none, disturbance);
+    EXPECT_NEAR(2 * z.dot(cost.at_disturbed(k * kStep).cast<double>() * disturbance), added, 2e-3 * std::sqrt(least(z, none) * least(none, disturbance)));
   }
 }
 
@@ -182,21 +220,25 @@ TEST(Regulate, DoesNotHangOnWhereTheMotionHeads) {
   for (const double yaw : {0.7, -2.0, 3.0}) EXPECT_LE((muscles_at(yaw) - ahead).norm(), 1e-6 * ahead.norm()) << yaw;
 }
 
+ReplayReport varied_box(Regulated& box, unsigned seed, double variation, double push, double regulator, double learn) {
+  PerformOptions options;
+  options.replay.duration_s = 1;
+  options.baselines = false;
+  options.seed = seed;
+  options.variation = variation;
+  if (push > 0) options.replay.pushes.push_back({0.2, 0, push * Eigen::Vector3d(std::cos(seed), 0, std::sin(seed))});
+  options.feedback.regulator = regulator;
+  options.replay.corrector.regulator.modes = 60;
+  options.replay.corrector.regulator.learn = learn;
+  return perform(box.performer, box.signals, options).main().report;
+}
+
 /// A body of other mass, friction and stiffness is pushed: it comes back as near to the plan as by the corrector, by nothing but muscles.
 TEST(Regulator, HoldsAPushedBodyAsNearToThePlanAsTheCorrectorAndPushesNothingFromOutside) {
   Regulated box;
-  for (const unsigned seed : {1U, 2U, 3U}) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    PerformOptions options;
-    options.replay.duration_s = 1;
-    options.baselines = false;
-    options.seed = seed;
-    options.variation = 0.1;
-    options.replay.pushes.push_back({0.2, 0, 0.1 * Eigen::Vector3d(std::cos(seed), 0, std::sin(seed))});
-    const ReplayReport usual = perform(box.performer, box.signals, options).main().report;
-    options.feedback.regulator = 1;
-    options.replay.corrector.regulator.modes = 60;
-    const ReplayReport regulated = perform(box.performer, box.signals, options).main().report;
+    const ReplayReport usual = varied_box(box, seed, 0.1, 0.1, 0, 0), regulated = varied_box(box, seed, 0.1, 0.1, 1, RegulatorOptions().learn);
     EXPECT_FALSE(regulated.fell);
     EXPECT_LT(regulated.shape_rms_length, 1.2 * usual.shape_rms_length);
     EXPECT_GT(regulated.correction_rms, usual.correction_rms) << "it was not the corrector that acted";
@@ -204,6 +246,17 @@ TEST(Regulator, HoldsAPushedBodyAsNearToThePlanAsTheCorrectorAndPushesNothingFro
     EXPECT_LE(regulated.angular_residual_mgl, 1e-6);
     EXPECT_EQ(regulated.external_assist_mg, 0);
   }
+}
+
+/// What very different bodies do otherwise all the time is learned as a disturbance, and met.
+TEST(Regulator, HoldsOtherBodiesNearerWhereItLearnsHowTheyDiffer) {
+  Regulated box;
+  double learned = 0, not_learned = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    learned += varied_box(box, seed, 0.4, 0, 1, RegulatorOptions().learn).shape_rms_length;
+    not_learned += varied_box(box, seed, 0.4, 0, 1, 0).shape_rms_length;
+  }
+  EXPECT_LT(learned, 0.75 * not_learned);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "io/wobble_file.h"
 #include "retarget/com_path.h"
 #include "retarget/flight.h"
+#include "retarget/leaps.h"
 #include "retarget/prepare_standing.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
@@ -176,7 +177,9 @@ void Conversion::perform_within_error() {
 void Conversion::let_go() {
   if (!is_performed_) perform_within_error();
   if (!choice_key_.empty()) stages_.cache().store("accuracy", choice_key_, record_of_choice(*chosen_));
-  if (wants_polish(options_) && !is_down(performances_.main())) polish();
+  const retarget::PreparedTarget& plan = performer().prepared;
+  const bool leaps_on = plan.target.loop && retarget::has_flight(plan);
+  if (wants_polish(options_, leaps_on) && !is_down(performances_.main())) polish();
   add_warnings(retarget::feedback_warnings(performances_));
   if (chosen_) target_.report.accuracy = told(*chosen_);
   report_replays(performances_, target_.report);

@@ -70,9 +70,9 @@ retarget::CreatureOptions creature_options(const ConvertOptions& options) {
   return result;
 }
 
-bool wants_polish(const ConvertOptions& options) {
+bool wants_polish(const ConvertOptions& options, bool leaps_on) {
   const std::string& grade = options.accuracy.grade;
-  return options.polish == "on" || (options.polish == "auto" && (grade == "standard" || grade == "final"));
+  return options.polish == "on" || (options.polish == "auto" && !leaps_on && (grade == "standard" || grade == "final"));
 }
 
 double wished_limit(const ConvertOptions& options) {

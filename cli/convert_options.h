@@ -30,8 +30,9 @@ void add_convert_options(CLI::App& app, ConvertOptions& options);
 
 /// Throw UsageError where options contradict each other.
 retarget::CreatureOptions creature_options(const ConvertOptions& options);
-/// Whether the signals are to be polished.
-bool wants_polish(const ConvertOptions& options);
+/// Whether the signals are to be polished. What leaps again and again is only where that is asked for: polished, it keeps its feet on fewer
+/// bodies that are not as planned.
+bool wants_polish(const ConvertOptions& options, bool leaps_on);
 /// Of |activation - 1|; 0: automatic.
 double wished_limit(const ConvertOptions& options);
 

@@ -118,7 +118,8 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
   add_wobble_option(app, options.wobble,
                     "Whether flesh swings over what the nodes carry, in the picture alone; auto: where it is seen");
   app.add_option("--polish", options.polish,
-                 "Whether the signals learn from replays what the corrector does in every cycle; auto: for --accuracy standard and final, but for a loop that leaps")
+                 "Whether the signals learn from replays what the corrector does in every cycle; auto: for --accuracy standard and final, "
+                 "but for a loop that leaps")
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->capture_default_str();
   app.add_option("--seed", options.seed, "Other than 0: the body that is let go differs from the plan by up to 2 % in "

@@ -56,8 +56,9 @@ struct ContactNow {
 ///
 /// Where a cost to go is known, regulate() takes the place of that target: min_w z' S z + effort |w|^2 + the excess over cones, of
 /// the deviation z after one control step (horizon_s), by the same response, so that what touches counts as it is and not as planned.
-/// What such steps turn out to miss is taken for a disturbance that lasts a while: of another body, of what the plan left out. Source:
-/// Muske, Badgwell, "Disturbance modeling for offset-free linear model predictive control", Journal of Process Control 12, 2002.
+/// What such steps turn out to miss is taken for a disturbance that lasts a while: of another body, of what the plan left out. It fades
+/// (RegulatorOptions::keep), so that it lessens what a body is off for good and does not end it. Source: Muske, Badgwell, "Disturbance
+/// modeling for offset-free linear model predictive control", Journal of Process Control 12, 2002.
 class Corrector {
  public:
   /// length [m] is L. Scene and muscles must outlive the corrector.
@@ -104,7 +105,7 @@ class Corrector {
   double haste_ = 0;               // 0 where that is no long step, 1 from twice a long one on
   Eigen::MatrixXd weighted_, normal_, cones_;  // weighted_: the few rows beside the nodes', x (muscles + 1)
   Eigen::VectorXd previous_;
-  Eigen::VectorXd predicted_, disturbance_;  // 2R: z after a regulator's last step, and what it is found off by; none before the first
+  Eigen::VectorXd predicted_, disturbance_;  // 2R: z as predicted at a regulator's last step, and what is learned of its errors; none before the first
   Eigen::Matrix3Xd force_, reference_force_;
 };
 

@@ -18,9 +18,9 @@ struct RegulatorOptions {
   double place = 1;      // on that of a place [per L]
   double speed = 0.1;    // on that of a speed [per sqrt(g L)]
   double effort = 1e-3;  // on the sum of squared muscles [-]
-  double learn = 0.3;    // share of what a step's end was off its prediction that counts as a disturbance of the next
-  double keep = 0.7;     // of a disturbance from step to step, as it is learned
-  double last = 0.5;     // and as the muscles meet it
+  double learn = 0.3;    // share of what a step's end was off its prediction that counts as a disturbance of the next [-]; more hums
+  double keep = 0.7;     // share of a disturbance that is left a control step later, as it is learned [-]
+  double last = 0.5;     // and as the muscles meet it [-]
 };
 
 /// What a regulator needs to know of a planned motion.

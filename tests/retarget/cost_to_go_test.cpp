@@ -173,7 +173,8 @@ TEST(CostToGo, KnowsWhatALastingDisturbanceAdds) {
     const Eigen::VectorXd z = 0.01 * random_vector(120, random), none = Eigen::VectorXd::Zero(120);
     const Eigen::VectorXd disturbance = 0.01 * random_vector(120, random);
     const double added = least(z, disturbance) - least(z, none) - least(none, disturbance);
-    EXPECT_NEAR(2 * z.dot(cost.at_disturbed(k * kStep).cast<double>() * disturbance), added, 2e-3 * std::sqrt(least(z, none) * least(none, disturbance)));
+    const double told = 2 * z.dot(cost.at_disturbed(k * kStep).cast<double>() * disturbance);
+    EXPECT_NEAR(told, added, 2e-3 * std::sqrt(least(z, none) * least(none, disturbance)));
   }
 }
 
@@ -220,6 +221,7 @@ TEST(Regulate, DoesNotHangOnWhereTheMotionHeads) {
   for (const double yaw : {0.7, -2.0, 3.0}) EXPECT_LE((muscles_at(yaw) - ahead).norm(), 1e-6 * ahead.norm()) << yaw;
 }
 
+/// A second of a body that is up to `variation` off the plan, pushed by `push` [m/s]; regulator 0: by the usual corrector.
 ReplayReport varied_box(Regulated& box, unsigned seed, double variation, double push, double regulator, double learn) {
   PerformOptions options;
   options.replay.duration_s = 1;

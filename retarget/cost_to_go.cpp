@@ -37,12 +37,16 @@ class Moments {
     moment.activation.resize(motion_.scene.body.edge_count());
     motion_.feed_forward(time_s + 0.5 * step_s_, moment.activation);
     const ContactSchedule& contacts = motion_.prepared.contacts;
-    moment.touching.assign(static_cast<std::size_t>(motion_.scene.contact_points.count()), ContactState::kOff);
+    const auto points = static_cast<std::size_t>(motion_.scene.contact_points.count());
+    moment.touching.assign(points, ContactState::kOff);
+    moment.patch.assign(points, -1);
     const Eigen::Index frame = frame_at(target_, time_s);
     for (std::size_t k = 0; k < contacts.patches.size(); ++k) {
       const ContactState state = contacts.state[k][static_cast<std::size_t>(frame)];
       for (const int p : contacts.patches[k].points) {
-        if (contacts.touching(p, frame)) moment.touching[static_cast<std::size_t>(p)] = state == ContactState::kSlide ? state : ContactState::kStick;
+        if (!contacts.touching(p, frame)) continue;
+        moment.touching[static_cast<std::size_t>(p)] = state == ContactState::kSlide ? state : ContactState::kStick;
+        moment.patch[static_cast<std::size_t>(p)] = static_cast<int>(k);
       }
     }
     return moment;

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "retarget/contact_loads.h"
 
@@ -56,33 +57,49 @@ LinearSteps::Derivatives LinearSteps::derivatives(const PlannedMoment& moment) {
   return {symmetric(modes_.fields.transpose() * by_place), symmetric(modes_.fields.transpose() * by_speed)};
 }
 
+LinearSteps::Holds LinearSteps::holds(const PlannedMoment& moment) const {
+  const Eigen::Index modes = modes_.count();
+  struct Foot {
+    Eigen::MatrixXd moves;  // 3 x R: the sum of its points'
+    int points = 0;
+    bool sticks = false;
+  };
+  std::map<int, Foot> feet;
+  const physics::ContactPoints& points = scene_.contact_points;
+  for (int p = 0; p < points.count(); ++p) {
+    const ContactState touch = moment.touching[static_cast<std::size_t>(p)];
+    if (touch == ContactState::kOff) continue;
+    Foot& foot = feet[moment.patch[static_cast<std::size_t>(p)]];
+    if (foot.points == 0) foot.moves.setZero(3, modes);
+    ++foot.points;
+    foot.sticks = touch == ContactState::kStick;
+    for (int c = 0; c < points.nodes.rows(); ++c) foot.moves += points.weights(c, p) * modes_.fields.middleRows<3>(3 * points.nodes(c, p));
+  }
+  Holds result{Eigen::MatrixXd::Zero(modes, modes), Eigen::MatrixXd::Zero(modes, modes)};
+  for (const auto& [patch, foot] : feet) {
+    const Eigen::RowVectorXd rise = scene_.ground.normal.transpose() * foot.moves;
+    const Eigen::MatrixXd level = rise.transpose() * rise / foot.points;
+    result.level += level;
+    result.stick += foot.sticks ? Eigen::MatrixXd(foot.moves.transpose() * foot.moves / foot.points) : level;
+  }
+  return result;
+}
+
 LinearStep LinearSteps::at(const PlannedMoment& moment) {
   forces_.set_activation(moment.activation);
   const auto [stiffness, damping] = derivatives(moment);
   const Eigen::Index modes = modes_.count();
   const double h = step_s_, per_second = speed_unit_ / length_;
-  Eigen::MatrixXd held = Eigen::MatrixXd::Zero(modes, modes), level = held;
-  const physics::ContactPoints& points = scene_.contact_points;
-  Eigen::MatrixXd moves(3, modes);
-  for (int p = 0; p < points.count(); ++p) {
-    const ContactState touch = moment.touching[static_cast<std::size_t>(p)];
-    if (touch == ContactState::kOff) continue;
-    moves.setZero();
-    for (int c = 0; c < points.nodes.rows(); ++c) moves += points.weights(c, p) * modes_.fields.middleRows<3>(3 * points.nodes(c, p));
-    const Eigen::RowVectorXd rise = scene_.ground.normal.transpose() * moves;
-    level.noalias() += rise.transpose() * rise;
-    if (touch == ContactState::kStick) held.noalias() += moves.transpose() * moves;
-    else held.noalias() += rise.transpose() * rise;
-  }
+  const Holds held = holds(moment);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> system(Eigen::MatrixXd::Identity(modes, modes) + h * damping + h * h * stiffness +
-                                                              contact_mass_ * held);
+                                                              contact_mass_ * held.stick);
   const Eigen::MatrixXd inverse =
       system.eigenvectors() * system.eigenvalues().cwiseMax(kSoftest).cwiseInverse().asDiagonal() * system.eigenvectors().transpose();
   LinearStep step;
   step.advance = h * per_second;
   step.carry.resize(modes, 2 * modes);
   step.carry.rightCols(modes) = inverse;
-  step.carry.leftCols(modes).noalias() = inverse * (h * stiffness + (kLevelShare * contact_mass_ / h) * level) / -per_second;
+  step.carry.leftCols(modes).noalias() = inverse * (h * stiffness + (kLevelShare * contact_mass_ / h) * held.level) / -per_second;
   const Eigen::MatrixXd push = modes_.fields.transpose() * (forces_.force_per_activation(moment.state.x) * muscles_.fields);
   step.drive.noalias() = inverse * ((h / speed_unit_) * push);
   return step;

@@ -22,8 +22,9 @@ struct LinearStep {
 ///
 ///   u' = A^-1 (u - h K q - (kc / 4) h Jn^T Jn q + h B w),   q' = q + h u',
 ///
-/// where J are the points that touch by plan and Jn their normals: a point that has come down elsewhere stays there, its height is the
-/// ground's. K is the whole derivative: a body tips over its feet by the part that compression adds, and what the Hessian's positive
+/// where J are the middles of the patches that touch by plan, each as often as it has touching points, and Jn their normals: a patch that has
+/// come down elsewhere stays there, its height is the ground's, and it takes no torque. Each point by itself would be held from above as
+/// well as from below, and a body that relies on soles that pull tips over as soon as they lift. K is the whole derivative: a body tips over its feet by the part that compression adds, and what the Hessian's positive
 /// part alone would tell stands by itself. Modes that buckle faster than a step can follow count as slower ones.
 class LinearSteps {
  public:
@@ -36,7 +37,11 @@ class LinearSteps {
   struct Derivatives {
     Eigen::MatrixXd stiffness, damping;  // R x R, symmetric
   };
+  struct Holds {
+    Eigen::MatrixXd stick, level;  // R x R: J^T J, Jn^T Jn
+  };
   Derivatives derivatives(const PlannedMoment& moment);
+  Holds holds(const PlannedMoment& moment) const;
 
   const physics::Scene& scene_;
   const Muscles& muscles_;

@@ -31,6 +31,11 @@ struct Regulated {
     moment.activation.resize(performer.scene.body.edge_count());
     player.at(static_cast<double>(step) * kStep, moment.activation);
     moment.touching.assign(static_cast<std::size_t>(performer.scene.contact_points.count()), touch);
+    moment.patch.assign(moment.touching.size(), -1);
+    const std::vector<Patch>& patches = performer.prepared.contacts.patches;
+    for (std::size_t k = 0; k < patches.size(); ++k) {
+      for (const int p : patches[k].points) moment.patch[static_cast<std::size_t>(p)] = static_cast<int>(k);
+    }
     return moment;
   }
   /// As the regulator takes it.
@@ -112,6 +117,47 @@ TEST(LinearSteps, AreTheDerivativeOfAStepInTheAir) {
     const Eigen::VectorXd expected = along(stepped(state, muscles), planned);
     const Eigen::VectorXd told = step.after(along(state, moment.state), muscles);
     EXPECT_LE((told - expected).norm(), 0.03 * expected.norm());
+  }
+}
+
+/// Of one foot's touching points only the middle is held: no torque of the ground turns it, for soles cannot pull.
+TEST(LinearSteps, GiveFeetNoTorqueOfTheGround) {
+  Regulated box;
+  const physics::Body& body = box.performer.scene.body;
+  const Eigen::VectorXd root_mass = body.mass.transpose().replicate<3, 1>().reshaped().cwiseSqrt();
+  const ReducedModes modes{Eigen::MatrixXd(root_mass.cwiseInverse().asDiagonal()), Eigen::MatrixXd(root_mass.asDiagonal())};
+  LinearSteps steps(box.performer.scene, box.performer.muscles, modes, box.performer.length, kStep);
+  const PlannedMoment standing = box.moment(0, ContactState::kStick);
+  const int foot = 0;
+  PlannedMoment on_one_foot = standing, in_air = box.moment(0, ContactState::kOff);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  int points = 0;
+  for (std::size_t p = 0; p < standing.patch.size(); ++p) {
+    if (standing.patch[p] == foot) middle += box.performer.scene.contact_points.of(standing.state.x, static_cast<int>(p)), ++points;
+    else on_one_foot.touching[p] = ContactState::kOff;
+  }
+  ASSERT_GT(points, 1);
+  middle /= points;
+  const LinearStep held = steps.at(on_one_foot), free = steps.at(in_air);
+  for (int c = 0; c < 3; ++c) {
+    Eigen::Matrix3Xd turning = standing.state.x.colwise() - middle;
+    for (auto speed : turning.colwise()) speed = Eigen::Vector3d::Unit(c).cross(Eigen::Vector3d(speed)).eval();
+    Eigen::VectorXd z = Eigen::VectorXd::Zero(2 * modes.count());
+    z.tail(modes.count()) = modes.project * turning.reshaped();
+    const auto spin = [&](const LinearStep& step) {
+      return (modes.project * turning.reshaped()).dot(step.after(z, Eigen::VectorXd::Zero(step.drive.cols())).tail(modes.count()));
+    };
+    EXPECT_NEAR(spin(held), spin(free), 0.02 * spin(free)) << "about axis " << c;
+    z.tail(modes.count()) = modes.project * Eigen::Vector3d::Unit(c).replicate(body.node_count(), 1);
+    const auto drift = [&](const LinearStep& step) {
+      Eigen::VectorXd after = modes.fields * step.after(z, Eigen::VectorXd::Zero(step.drive.cols())).tail(modes.count());
+      Eigen::Vector3d speed = Eigen::Vector3d::Zero();
+      for (std::size_t p = 0; p < standing.patch.size(); ++p) {
+        if (standing.patch[p] == foot) speed += box.performer.scene.contact_points.of(after.reshaped(3, body.node_count()).eval(), static_cast<int>(p)) / points;
+      }
+      return speed[c];
+    };
+    EXPECT_LT(std::abs(drift(held)), 0.3 * std::abs(drift(free))) << "along axis " << c;
   }
 }
 
@@ -235,19 +281,22 @@ ReplayReport varied_box(Regulated& box, unsigned seed, double variation, double 
   return perform(box.performer, box.signals, options).main().report;
 }
 
-/// A body of other mass, friction and stiffness is pushed: it comes back as near to the plan as by the corrector, by nothing but muscles.
-TEST(Regulator, HoldsAPushedBodyAsNearToThePlanAsTheCorrectorAndPushesNothingFromOutside) {
+/// A body of other mass, friction and stiffness is pushed: it comes back nearer to the plan than by the corrector, by nothing but muscles.
+TEST(Regulator, HoldsPushedBodiesNearerToThePlanThanTheCorrectorAndPushesNothingFromOutside) {
   Regulated box;
+  double by_corrector = 0, by_regulator = 0;
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const ReplayReport usual = varied_box(box, seed, 0.1, 0.1, 0, 0), regulated = varied_box(box, seed, 0.1, 0.1, 1, RegulatorOptions().learn);
     EXPECT_FALSE(regulated.fell);
-    EXPECT_LT(regulated.shape_rms_length, 1.2 * usual.shape_rms_length);
+    EXPECT_LT(regulated.shape_rms_length, 1.5 * usual.shape_rms_length);
+    by_corrector += usual.shape_rms_length, by_regulator += regulated.shape_rms_length;
     EXPECT_GT(regulated.correction_rms, usual.correction_rms) << "it was not the corrector that acted";
     EXPECT_LE(regulated.momentum_residual_mg, 1e-6);
     EXPECT_LE(regulated.angular_residual_mgl, 1e-6);
     EXPECT_EQ(regulated.external_assist_mg, 0);
   }
+  EXPECT_LT(by_regulator, 0.9 * by_corrector);
 }
 
 /// What very different bodies do otherwise all the time is learned as a disturbance, and met.

@@ -136,8 +136,6 @@ bool is_dragged(const ContactSchedule& contacts) {
   return std::any_of(contacts.state.begin(), contacts.state.end(), slides);
 }
 
-bool is_walk(const ContactSchedule& contacts, double rate_hz) { return !is_dragged(contacts) && contacts.flight_s(rate_hz) < kFlicker; }
-
 double ContactSchedule::flight_s(double rate_hz) const {
   Eigen::Index flying = 0;
   for (Eigen::Index f = 0; f < touching.cols(); ++f) flying += touching.col(f).any() ? 0 : 1;

@@ -31,11 +31,6 @@ struct ContactSchedule {
 /// Whether the plan lets a patch slide that bears load.
 bool is_dragged(const ContactSchedule& contacts);
 
-constexpr double kFlicker = 0.05;  // [s] without any contact: less is no flight
-
-/// Whether a plan goes on feet that stand where they are put: nothing is dragged, nothing flies.
-bool is_walk(const ContactSchedule& contacts, double rate_hz);
-
 struct ContactOptions {
   double height = 0.03;        // per D: a patch touches below this
   double hysteresis = 1.5;     // on height, while it touches

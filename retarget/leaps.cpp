@@ -7,6 +7,7 @@
 namespace hydrostat::retarget {
 namespace {
 
+constexpr double kLeap = 0.05;     // [s] in the air: less is a flicker of contacts
 constexpr double kLanding = 0.07;  // [s] from the flight to the last foot that lands
 constexpr double kFeetOfLeaps = 1.0 / 8, kMomentumOfHops = 0.5;  // of the rows' usual weights
 constexpr double kEffortOfHops = 3.2, kNodesOfHops = 3, kHorizonOfHops = 1.5;  // times the usual
@@ -68,7 +69,7 @@ std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_
     if (!begins) continue;
     long end = f;
     while (!touches(end) && (loop || end < frames)) ++end;
-    if (static_cast<double>(end - f) / rate_hz < kFlicker) continue;
+    if (static_cast<double>(end - f) / rate_hz < kLeap) continue;
     for (long g = f; g < end; ++g) flying[wrapped(g, frames)] = true;
   }
   return flying;

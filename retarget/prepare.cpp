@@ -22,6 +22,7 @@ constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
 constexpr double kOverReach = 4.0 / 3; // times reach: what a clip needs beyond that is held back
 constexpr double kFar = 0.04;         // of L: further no shift should move a clip
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
+constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
 constexpr ShiftCosts kLeapCosts{0.1, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
 constexpr double kLeapFriction = 1.05;  // times the usual share of friction: it is moved less
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
@@ -59,7 +60,7 @@ ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, co
 
 /// Whether a clip leaps and loads that come and go gently would move it too far.
 bool leaps_far(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length, double support_friction) {
-  if (contacts.flight_s(target.rate_hz) < kFlicker) return false;
+  if (contacts.flight_s(target.rate_hz) < kLeap) return false;
   const Shift shift = find_shift(target, scene, contacts, length, support_friction);
   const double far = std::sqrt(shift.move.squaredNorm() / static_cast<double>(shift.move.cols()));
   return far > kFar * length;
@@ -183,7 +184,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   std::vector<std::vector<Hold>> holds = find_holds(contacts, points);
   Eigen::MatrixXd floor;
   Motion locked;
-  ShapeProjector projector(scene, length, options.volume, is_walk(contacts, target.rate_hz));
+  ShapeProjector projector(scene, length, options.volume);
   std::optional<double> held_to;
   Eigen::VectorXd reach;
   bool is_far_leap = false;  // then loads do not fade by themselves before a foot leaves

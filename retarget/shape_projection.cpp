@@ -11,9 +11,7 @@ namespace {
 
 constexpr double kEdgeShare = 0.02;   // of the springs, at rest in the animator's shape, that keeps the volume step from folding
 constexpr double kReachShare = 0.1;   // where the animator's shape is beyond reach, that holds it back
-// Of g / L [1/s2]: pull back to the animator's shape. By the loose one a folded leg unfolds to be rid of its springs' stress, and its swing is
-// lost; by the firm one a frog's hop and a worm's crawl went off their way (measured).
-constexpr double kTether = 40, kFirmTether = 400;
+constexpr double kTether = 40;        // of g / L [1/s2]: pull back to the animator's shape
 constexpr double kHold = 1000;        // a contact's pull over a node's tether
 
 /// A run of sticking frames of one patch [begin, end); in a loop it may pass the seam, its later part then lies one period on.
@@ -91,10 +89,10 @@ Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double cleara
   return floor;
 }
 
-ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume, bool is_walk)
+ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume)
     : scene_(scene), body_(scene.body), matrix_(scene.body) {
   if (!keep_volume) body_.volume_stiffness.setZero();
-  tether_ = (is_walk ? kFirmTether : kTether) * scene.gravity.norm() / length;
+  tether_ = kTether * scene.gravity.norm() / length;
   // Light limbs are held to their shape as firmly as the trunk.
   body_.mass.setConstant(body_.mass.mean());
   hold_ = kHold * tether_ * body_.mass.mean();

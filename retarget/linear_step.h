@@ -14,6 +14,7 @@ struct LinearStep {
   Eigen::MatrixXd drive;  // R x muscles
   double advance = 0;     // the step in units of L / sqrt(g L)
 
+  /// z' (2R) by z (2R) and the muscles' activations [-].
   Eigen::VectorXd after(const Eigen::VectorXd& z, const Eigen::VectorXd& muscles) const;
 };
 
@@ -25,7 +26,8 @@ struct LinearStep {
 /// where J are the middles of the patches that touch by plan, each as often as it has touching points, and Jn their normals: a patch that has
 /// come down elsewhere stays there, its height is the ground's, and it takes no torque. Each point by itself would be held from above as
 /// well as from below, and a body that relies on soles that pull tips over as soon as they lift. K is the whole derivative: a body
-/// tips over its feet by the part that compression adds, and what the Hessian's positive part alone would tell stands by itself. Modes that buckle faster than a step can follow count as slower ones.
+/// tips over its feet by the part that compression adds, and what the Hessian's positive part alone would tell stands by itself. Modes that
+/// buckle faster than a step can follow count as slower ones.
 class LinearSteps {
  public:
   /// length [m] is L. Everything must outlive this.

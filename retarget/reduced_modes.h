@@ -15,7 +15,7 @@ struct PlannedMoment {
   physics::State state;
   Eigen::VectorXd activation;          // E
   std::vector<ContactState> touching;  // P, by plan
-  std::vector<int> patch;              // P: whose the point is; -1 where it does not touch
+  std::vector<int> patch;              // P: index of the patch whose the point is; -1 where it does not touch
 };
 
 /// A few ways to move that stand for all 3N: fields over the nodes, orthonormal by mass.

@@ -87,8 +87,8 @@ void Conversion::make_body(const io::ImportedCharacter& imported) {
 
 void Conversion::find_activations(double wished_limit) {
   const physics::Scene& scene = creature_.scene;
-  key_ = key_after(key_, options_.friction);
-  retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_); });
+  key_ = key_after(key_, options_.friction, settings_.firmness);
+  retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_, settings_.firmness); });
   retarget::lighten(prepared, creature_.scene.body);
   retarget::InverseOptions inverse_options;
   inverse_options.limit = wished_limit;

@@ -60,6 +60,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
                      {"friction", options.friction},
                      {"wobble", options.wobble},
                      {"polish", options.polish},
+                     {"firmness", performer.prepared.firmness},
                      {"seed", std::int64_t{options.seed}}};
   for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
   if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);

@@ -66,6 +66,7 @@ retarget::CreatureOptions creature_options(const ConvertOptions& options) {
     throw UsageError("hydrostat convert", "option --calibrated", "only tets of finite elements are calibrated",
                      "Give --material stable_neo_hookean or corotated_linear, or leave --calibrated out.");
   }
+  result.firmness = options.firmness;
   result.threads = options.threads;
   return result;
 }
@@ -104,6 +105,9 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
   app.add_option("--material", options.material,
                    "What bears the stress: springs, stable_neo_hookean, corotated_linear, or auto")
       ->check(CLI::IsMember({"auto", "springs", "stable_neo_hookean", "corotated_linear"}))
+      ->capture_default_str();
+  app.add_option("--firmness", options.firmness, "How firmly the plan holds on to the clip's shape, 1 to 100 times the usual")
+      ->check(number_within(1, 100))
       ->capture_default_str();
   app.add_flag("--calibrated", options.calibrated,
                             "Tets of finite elements bend as the cells would that they are cut from");

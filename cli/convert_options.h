@@ -15,7 +15,7 @@ constexpr const char *kTet = "tet", *kHex = "hex";
 struct ConvertOptions {
   std::string clip_file, out, clip, root_motion = "auto", limit = "auto", method = "auto", element = kTet, material = "auto",
               wobble = "auto", polish = "auto", scene;
-  double height = 0;
+  double height = 0, firmness = retarget::CreatureOptions().firmness;
   int nodes = 0;
   double friction = retarget::CreatureOptions().friction;
   unsigned seed = 0;

@@ -9,8 +9,8 @@
 
 namespace hydrostat::cli {
 
-retarget::PreparedTarget prepared_target(const retarget::Creature& creature, const retarget::ImportedMotion& motion) {
-  retarget::PreparedTarget prepared = retarget::prepare_standing(creature, motion);
+retarget::PreparedTarget prepared_target(const retarget::Creature& creature, const retarget::ImportedMotion& motion, double firmness) {
+  retarget::PreparedTarget prepared = retarget::prepare_standing(creature, motion, firmness);
   retarget::find_legs(creature.character.skeleton, prepared.contacts);
   return prepared;
 }

@@ -186,8 +186,8 @@ void name_fields(RecordArchive& archive, retarget::PreparationReport& report) {
 
 void name_fields(RecordArchive& archive, retarget::PreparedTarget& prepared) {
   archive.fields("target", prepared.target, "contacts", prepared.contacts, "missing_wrench", prepared.missing_wrench,
-                 "mass_shares", prepared.mass_shares, "support_friction", prepared.support_friction, "report", prepared.report,
-                 "warnings", prepared.warnings);
+                 "mass_shares", prepared.mass_shares, "support_friction", prepared.support_friction, "firmness", prepared.firmness, "report",
+                 prepared.report, "warnings", prepared.warnings);
 }
 
 void name_fields(RecordArchive& archive, retarget::InverseReport& report) {

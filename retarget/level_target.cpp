@@ -201,7 +201,7 @@ void project(const Creature& level, double size, PreparedTarget& prepared) {
       find_holds(prepared.contacts, point_motion(scene.contact_points, prepared.target));
   const Eigen::MatrixXd floor =
       floors(prepared.contacts, prepared.target.loop, options.clearance * size, options.clearance_frames);
-  ShapeProjector projector(scene, level.length, true);
+  ShapeProjector projector(scene, level.length, true, prepared.firmness);
   Motion wanted = prepared.target;
   const Eigen::VectorXd reach = Eigen::VectorXd::Constant(wanted.count(), std::numeric_limits<double>::infinity());
   prepared.target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);

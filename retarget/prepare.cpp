@@ -173,6 +173,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   Motion& target = result.target;
   target = smooth(coupled, options.smooth_hz);
   result.support_friction = options.support_friction;
+  result.firmness = options.firmness;
   report.smooth_shift_rms_length = rms_difference(target, coupled, body.mass) / length;
 
   Motion points = point_motion(scene.contact_points, coupled);
@@ -184,7 +185,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   std::vector<std::vector<Hold>> holds = find_holds(contacts, points);
   Eigen::MatrixXd floor;
   Motion locked;
-  ShapeProjector projector(scene, length, options.volume);
+  ShapeProjector projector(scene, length, options.volume, options.firmness);
   std::optional<double> held_to;
   Eigen::VectorXd reach;
   bool is_far_leap = false;  // then loads do not fade by themselves before a foot leaves

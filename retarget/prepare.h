@@ -9,6 +9,7 @@ namespace hydrostat::retarget {
 struct PrepareOptions {
   double smooth_hz = 10;         // cut-off of the smoothing (half amplitude)
   double support_friction = 0.7; // of the ground's friction that the plan may use; 5 % more in a far leap
+  double firmness = 1;           // of the pull to the animator's shape, against springs that would be rid of their stress
   int rounds = 3;                // of volume and momentum
   double clearance = 0.015;      // per D: what is not in contact stays that far above the ground, fading towards contacts
   int clearance_frames = 4;      // over which it fades
@@ -26,6 +27,7 @@ struct PreparedTarget {
   PreparationReport report;
   std::vector<std::string> warnings;
   double support_friction = 0.7;   // of the ground's friction that it uses
+  double firmness = 1;             // by which it was prepared
 };
 
 /// Smooths, locks feet, restores volume and shifts the centre of mass and turns the trunk until gravity, contact forces inside

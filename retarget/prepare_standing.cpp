@@ -11,11 +11,14 @@ constexpr double kMostShift = 0.04;  // of L, by which preparation may move the 
 constexpr double kLess = 0.5;        // of the shift: so much less is worth the mass
 constexpr double kMissing = 0.01;    // [m g] of missing force that does not count
 
-PreparedTarget prepare_with(const Eigen::VectorXd& mass, const Creature& creature, const ImportedMotion& imported) {
+PreparedTarget prepare_with(const Eigen::VectorXd& mass, const Creature& creature, const ImportedMotion& imported,
+                            double firmness) {
+  PrepareOptions options = prepare_options(imported);
+  options.firmness = firmness;
   physics::Scene scene = preparation_scene(creature);
   scene.body.mass = mass;
   return prepare(imported.nodes, scene, bones_of(creature.contacts), creature.character.skeleton.names, creature.mesh.bone_weights,
-                 creature.length, creature.size, prepare_options(imported));
+                 creature.length, creature.size, options);
 }
 
 std::string told(const StaticBalance& balance, const Creature& creature) {
@@ -34,14 +37,14 @@ std::string told(const StaticBalance& balance, const Creature& creature) {
 
 }  // namespace
 
-PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& imported) {
+PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& imported, double firmness) {
   const Eigen::VectorXd& mass = creature.scene.body.mass;
-  PreparedTarget prepared = prepare_with(mass, creature, imported);
+  PreparedTarget prepared = prepare_with(mass, creature, imported, firmness);
   if (prepared.report.total_shift_rms_length <= kMostShift) return prepared;
   const StaticBalance balance =
       balance_statically(imported.nodes, imported.skin_points, mass, ContactOptions().height * creature.size);
   if (balance.overhang == 0 || !balance.stands) return prepared;
-  PreparedTarget lighter = prepare_with(mass.cwiseProduct(balance.mass_shares), creature, imported);
+  PreparedTarget lighter = prepare_with(mass.cwiseProduct(balance.mass_shares), creature, imported, firmness);
   const bool is_better = lighter.report.total_shift_rms_length < kLess * prepared.report.total_shift_rms_length &&
                          lighter.report.missing_wrench_rms_mg < prepared.report.missing_wrench_rms_mg + kMissing;
   if (!is_better) return prepared;

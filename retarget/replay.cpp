@@ -11,6 +11,7 @@
 #include "retarget/cpu_seconds.h"
 #include "retarget/divergence.h"
 #include "retarget/fall.h"
+#include "retarget/firm_plan.h"
 #include "retarget/leap_feedback.h"
 #include "retarget/leaps.h"
 #include "retarget/obstacle_moves.h"
@@ -44,7 +45,7 @@ physics::State first_state(const Motion& target, const MotionCurve& curve, Nomin
 
 /// The corrector's options as the plan and its path want them.
 CorrectorOptions gain_for(const ReplayInput& input, const ReplayOptions& options) {
-  CorrectorOptions gain = gain_of_leaps(input.prepared, gain_on_path(input, options.corrector));
+  CorrectorOptions gain = gain_of_firm_plan(input.prepared, gain_of_leaps(input.prepared, gain_on_path(input, options.corrector)));
   gain.regulator.reach = 0;
   return gain;
 }
@@ -319,7 +320,7 @@ void Run::control() {
   planned_.look(time_s_, gain_.horizon_s, uneven_.has_value(), contact_);
   if (uneven_) {
     uneven_->look(time_s_, control_s_, fit_, seen);
-    uneven_->lead(contact_.in_air, seen, glided_, options_.corrector.foot_settle_s, contact_.lead);
+    uneven_->lead(contact_.in_air, seen, glided_, gain_.foot_settle_s, contact_.lead);
     uneven_->apply(physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
   }
   command(time_s_ + 0.5 * control_s_);

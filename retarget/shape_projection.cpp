@@ -89,10 +89,10 @@ Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double cleara
   return floor;
 }
 
-ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume)
+ShapeProjector::ShapeProjector(const physics::Scene& scene, double length, bool keep_volume, double firmness)
     : scene_(scene), body_(scene.body), matrix_(scene.body) {
   if (!keep_volume) body_.volume_stiffness.setZero();
-  tether_ = kTether * scene.gravity.norm() / length;
+  tether_ = firmness * kTether * scene.gravity.norm() / length;
   // Light limbs are held to their shape as firmly as the trunk.
   body_.mass.setConstant(body_.mass.mean());
   hold_ = kHold * tether_ * body_.mass.mean();

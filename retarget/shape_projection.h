@@ -26,8 +26,8 @@ Eigen::MatrixXd floors(const ContactSchedule& contacts, bool loop, double cleara
 /// Newton on tether + volume + a little of the springs. Constraints that the target strains beyond `reach` [-] are held back to it.
 class ShapeProjector {
  public:
-  /// length [m] is L. The scene must outlive the projector.
-  ShapeProjector(const physics::Scene& scene, double length, bool keep_volume);
+  /// length [m] is L; `firmness` (1: as usual) is how much more firmly holds and tether pull. The scene must outlive the projector.
+  ShapeProjector(const physics::Scene& scene, double length, bool keep_volume, double firmness);
 
   /// `floor` [m]: the least height of each contact point; `reach` [-] may be infinite.
   Eigen::Matrix3Xd project(const Eigen::Matrix3Xd& target, const std::vector<Hold>& holds, const Eigen::VectorXd& floor, double reach);

@@ -197,6 +197,24 @@ TEST(Convert, GivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(motion_bytes(one), motion_bytes(two));
 }
 
+/// Where that is asked for a plan holds on to the clip's shape more firmly, and levels and replays go by it.
+TEST(Convert, HoldsOnToTheClipsShapeAsFirmlyAsIsAsked) {
+  const TemporaryDirectory directory;
+  const auto made = [&](const std::string& name, const std::string& option) {
+    EXPECT_EQ(convert(directory.path, kSmallClip, name, option).exit_code, 0);
+    return report_of(directory.path / name)["replay"]["closed_loop"];
+  };
+  const json usual = made("usual", ""), firm = made("firm", "--firmness 10");
+  EXPECT_LT(firm["clip_shape_rms_length"], 0.9 * usual["clip_shape_rms_length"].get<double>());
+  EXPECT_LT(firm["slip_per_stance_length"], usual["slip_per_stance_length"]);
+  EXPECT_EQ(firm["external_assist_mg"], 0);
+  EXPECT_NE(io::read_file(directory.path / "usual" / "creature.toml").find("firmness = 1.0"), std::string::npos);
+  EXPECT_NE(io::read_file(directory.path / "firm" / "creature.toml").find("firmness = 10.0"), std::string::npos);
+  const std::string motion = motion_bytes(directory.path / "firm");
+  EXPECT_EQ(hydrostat_in(directory.path, "replay firm --quiet").exit_code, 0);
+  EXPECT_EQ(motion_bytes(directory.path / "firm"), motion);
+}
+
 /// What of the correction comes back in every cycle is the signals' own then, and they keep the creature up by themselves for longer.
 TEST(Convert, PolishesTheSignals) {
   const TemporaryDirectory directory;
@@ -348,6 +366,8 @@ TEST(Convert, RefusesBadInputInOneLineAndLeavesNothing) {
   expect(trot + " -o out --nodes 40.5", 2, "option --nodes: '40.5' is not a whole number");
   expect(trot + " -o out --limit 2", 2, "option --limit: Value 2 not in range 0.01 to 0.9.");
   expect(trot + " -o out --limit most", 2, "option --limit: Value most not in range 0.01 to 0.9.");
+  expect(trot + " -o out --firmness 0.5", 2, "option --firmness: Value 0.5 not in range 1 to 100.");
+  expect(trot + " -o out --firmness firm", 2, "option --firmness: Value firm not in range 1 to 100.");
   expect(trot + " -o out --friction -1", 2, "option --friction: Value -1 not in range 0.05 to 5.");
   expect(trot + " -o out --threads 0", 2, "option --threads: Value 0 not in range 1 to 256.");
   expect(trot + " -o out --element cube", 2, "option --element: cube not in");

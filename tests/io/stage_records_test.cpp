@@ -64,12 +64,14 @@ TEST(TargetFile, ComesBackWholeOrNotAtAll) {
   PerformedTarget target;
   target.performer = retarget::make_box_performer();
   target.performer.prepared.support_friction = 0.6;
+  target.performer.prepared.firmness = 7;
   target.report.source.clip = "Walk";
   target.report.warnings = {"told"};
   const std::string bytes = target_bytes(target);
   const PerformedTarget read = parse_target(bytes, "target.bin");
   EXPECT_EQ(read.performer.prepared.target.frames, target.performer.prepared.target.frames);
   EXPECT_EQ(read.performer.prepared.support_friction, 0.6);
+  EXPECT_EQ(read.performer.prepared.firmness, 7);
   EXPECT_EQ(read.performer.prepared.contacts.state, target.performer.prepared.contacts.state);
   EXPECT_EQ(read.performer.muscles.fields, target.performer.muscles.fields);
   EXPECT_EQ(read.report.source.clip, "Walk");

@@ -20,6 +20,7 @@ class Snapshots {
         gram_(Eigen::MatrixXd::Zero(root_mass_.size(), root_mass_.size())) {}
 
   void take(Eigen::MatrixXd answers, double share) {
+    if (answers.cols() == 0) return;  // of what never touches; Eigen would divide by zero
     answers = root_mass_.asDiagonal() * answers;
     for (auto answer : answers.colwise()) {
       if (const double norm = answer.norm(); norm > 0) answer *= share / norm;

@@ -84,6 +84,15 @@ TEST(ReducedModes, AreOrthonormalByMassAndHaveAllRigidMovesAndAllThatMusclesDo) 
   for (const auto muscle : response.velocities().colwise()) EXPECT_LE(lost(muscle), 0.1);
 }
 
+/// A clip in which nothing touches the ground has no answers of contact.
+TEST(ReducedModes, AreFoundWhereNothingEverTouches) {
+  Regulated box;
+  const std::vector<PlannedMoment> moments{box.moment(0, ContactState::kOff), box.moment(10, ContactState::kOff)};
+  const ReducedModes modes = find_reduced_modes(box.performer.scene, box.performer.muscles, moments, box.performer.length, 40);
+  ASSERT_EQ(modes.count(), 40);
+  EXPECT_TRUE((modes.project * modes.fields).isIdentity(1e-9));
+}
+
 /// Of all modes and in the air a linear step is what the implicit integrator makes of a small difference.
 TEST(LinearSteps, AreTheDerivativeOfAStepInTheAir) {
   Regulated box;

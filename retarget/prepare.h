@@ -27,7 +27,7 @@ struct PreparedTarget {
   PreparationReport report;
   std::vector<std::string> warnings;
   double support_friction = 0.7;   // of the ground's friction that it uses
-  double firmness = 1;             // by which it was prepared
+  double firmness = 1;             // by which it was prepared, in times the usual
 };
 
 /// Smooths, locks feet, restores volume and shifts the centre of mass and turns the trunk until gravity, contact forces inside

@@ -145,7 +145,7 @@ SpeedRow measure(const SpeedCommand& command, const retarget::Character& charact
   row.coupling_ms = ms_of(motion, [&] { return retarget::import_motion(creature, settings); });
   row.frames = static_cast<int>(motion.nodes.count());
   retarget::PreparedTarget prepared;
-  row.preparation_ms = ms_of(prepared, [&] { return prepared_target(creature, motion); });
+  row.preparation_ms = ms_of(prepared, [&] { return prepared_target(creature, motion, settings); });
   retarget::lighten(prepared, creature.scene.body);
   retarget::InverseOptions inverse_options;
   inverse_options.threads = 1;

@@ -1,5 +1,6 @@
 #include "cli/conversion.h"
 
+#include <cstdio>
 #include <filesystem>
 #include <iostream>
 
@@ -56,7 +57,11 @@ void Conversion::run(const io::ImportedCharacter& imported, double wished_limit)
   add_warnings(imported.warnings);
   appearance_ = imported.appearance;
   solve(imported, wished_limit);
-  if (options_.accuracy.is_asked()) choose(imported, wished_limit);
+  if (options_.accuracy.is_asked()) {
+    choose(imported, wished_limit);
+  } else if (options_.scene.empty()) {
+    stay_up(imported, wished_limit);
+  }
   put_in_scene();
   let_go();
   write();
@@ -67,6 +72,30 @@ void Conversion::solve(const io::ImportedCharacter& imported, double wished_limi
   find_activations(wished_limit);
   solve_signals();
   solved_key_ = key_;
+}
+
+void Conversion::stay_up(const io::ImportedCharacter& imported, double wished_limit) {
+  perform_within_error();
+  if (!is_down(performances_.main())) return;
+  stages_.run("spread_load", [&] {
+    Progress silent(std::cerr, ProgressStyle::silent);
+    Stages stages = stages_beside("spread", silent);
+    retarget::CreatureOptions settings = settings_;
+    settings.spread_load = true;
+    const std::unique_ptr<Conversion> spread = solved_by(settings, imported, wished_limit, stages);
+    if (!spread) return 0;
+    spread->perform();
+    if (is_down(spread->performances_.main())) return 0;
+    const double usual_shift = target_.report.preparation.total_shift_rms_length;
+    take_over(*spread);
+    char text[300];
+    std::snprintf(text, sizeof text,
+                  "the creature falls where the clip is moved as little as balance allows, by %.1f %% L: it is moved by %.1f %% L, which spreads "
+                  "its load over more of what bears it, and stays up",
+                  100 * usual_shift, 100 * target_.report.preparation.total_shift_rms_length);
+    add_warnings({text});
+    return 0;
+  });
 }
 
 void Conversion::add_warnings(const std::vector<std::string>& more) {
@@ -87,8 +116,8 @@ void Conversion::make_body(const io::ImportedCharacter& imported) {
 
 void Conversion::find_activations(double wished_limit) {
   const physics::Scene& scene = creature_.scene;
-  key_ = key_after(key_, options_.friction, settings_.firmness);
-  retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_, settings_.firmness); });
+  key_ = key_after(key_, options_.friction, settings_.firmness, std::int64_t{settings_.spread_load});
+  retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_, settings_); });
   retarget::lighten(prepared, creature_.scene.body);
   retarget::InverseOptions inverse_options;
   inverse_options.limit = wished_limit;
@@ -242,7 +271,7 @@ void Conversion::polish() {
 void Conversion::write() {
   const retarget::Performer& performer = target_.performer;  // on its flat ground
   stages_.run("files", [&] {
-    writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.feedback, settings_.nodes)));
+    writer_.write("creature.toml", io::to_toml(creature_record(options_, performer, target_.report, chosen_, performances_.feedback, settings_)));
     writer_.write("body.json", io::body_text(performer, creature_.character.skeleton.names,
                                              dominant_bones_of_nodes(creature_.mesh.bone_weights)));
     writer_.write("target.bin", target_file_);

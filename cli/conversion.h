@@ -28,6 +28,17 @@ class Conversion {
   const retarget::RunReport& report() const { return target_.report; }
 
  private:
+  /// Lets it go, and where it falls prepares and solves it again with its load spread wider (PrepareOptions), which is kept if it
+  /// stays up by that.
+  void stay_up(const io::ImportedCharacter& imported, double wished_limit);
+
+  /// Solved by other settings; none where the clip cannot be solved by them.
+  std::unique_ptr<Conversion> solved_by(const retarget::CreatureOptions& settings, const io::ImportedCharacter& imported, double wished_limit,
+                                        Stages& stages);
+
+  /// Stages with a cache of their own below this one's.
+  Stages stages_beside(const std::string& name, Progress& progress) const;
+
   void add_warnings(const std::vector<std::string>& more);
 
   /// Body, activations and signals on a control mesh.
@@ -62,8 +73,6 @@ class Conversion {
 
   /// Solved on a mesh of so many wished nodes; none where the clip cannot be solved on it.
   std::unique_ptr<Conversion> on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished, Stages& stages);
-
-  Stages coarser_stages(Progress& progress) const;
 
   void take_over(Conversion& coarser);
 

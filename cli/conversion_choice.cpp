@@ -39,15 +39,15 @@ void Conversion::repeat_choice(const io::ImportedCharacter& imported, double wis
   cut_signals();
   if (chosen_->wished_nodes == 0) return;
   Progress silent(std::cerr, ProgressStyle::silent);
-  Stages stages = coarser_stages(silent);
+  Stages stages = stages_beside("coarser", silent);
   const std::unique_ptr<Conversion> coarser = on_coarser_mesh(imported, wished_limit, chosen_->wished_nodes, stages);
   coarser->perform();
   take_over(*coarser);
 }
 
-Stages Conversion::coarser_stages(Progress& progress) const {
+Stages Conversion::stages_beside(const std::string& name, Progress& progress) const {
   Stages stages(progress);
-  stages.use_cache(writer_.cache_directory() / "coarser");
+  stages.use_cache(writer_.cache_directory() / name);
   return stages;
 }
 
@@ -68,7 +68,7 @@ void Conversion::choose_nodes(const io::ImportedCharacter& imported, double wish
   const int own = creature_.mesh.node_count();
   int last = 0;
   Progress silent(std::cerr, ProgressStyle::silent);
-  Stages stages = coarser_stages(silent);
+  Stages stages = stages_beside("coarser", silent);
   for (const double part : {0.25, 0.35, 0.5, 0.7}) {
     const int wished = static_cast<int>(std::lround(part * own));
     if (wished < kFewest) continue;
@@ -112,19 +112,26 @@ bool Conversion::take_mesh(Conversion& coarser, int wished, const retarget::Step
   return true;
 }
 
+std::unique_ptr<Conversion> Conversion::solved_by(const retarget::CreatureOptions& settings, const io::ImportedCharacter& imported,
+                                                  double wished_limit, Stages& stages) {
+  auto other = std::make_unique<Conversion>(options_, settings, stages, writer_);
+  try {
+    other->add_warnings(imported.warnings);
+    other->solve(imported, wished_limit);
+  } catch (const io::WriteError&) {
+    throw;
+  } catch (const Error&) {
+    return nullptr;
+  }
+  return other;
+}
+
 std::unique_ptr<Conversion> Conversion::on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished,
                                                         Stages& stages) {
   retarget::CreatureOptions settings = settings_;
   settings.nodes = wished;
-  auto coarser = std::make_unique<Conversion>(options_, settings, stages, writer_);
-  try {
-    coarser->add_warnings(imported.warnings);
-    coarser->solve(imported, wished_limit);
-  } catch (const io::WriteError&) {
-    throw;
-  } catch (const Error&) {  // no body or no plan on so few nodes
-    return nullptr;
-  }
+  std::unique_ptr<Conversion> coarser = solved_by(settings, imported, wished_limit, stages);
+  if (!coarser) return nullptr;
   coarser->chosen_ = chosen_;
   coarser->whole_signals_ = coarser->signals_;
   coarser->cut_signals();

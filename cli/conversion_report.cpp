@@ -42,14 +42,14 @@ retarget::BodyReport body_report(const retarget::Creature& creature) {
 }
 
 io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
-                                   const std::optional<ChosenStep>& chosen, const retarget::Feedback& feedback, int nodes) {
+                                   const std::optional<ChosenStep>& chosen, const retarget::Feedback& feedback, const retarget::CreatureOptions& settings) {
   io::CreatureRecord record;
   record.source_file = fs::absolute(options.clip_file).string();
   record.source_sha256 = report.source.sha256;
   record.clip = report.source.clip;
   record.clip_rise_m = performer.clip_rise;
   record.settings = {{"height", options.height},
-                     {"nodes", std::int64_t{nodes}},
+                     {"nodes", std::int64_t{settings.nodes}},
                      {"root-motion", options.root_motion},
                      {"limit", report.inverse.limit},
                      {"limit-chosen-by", options.limit == "auto" ? std::string("auto") : std::string("user")},
@@ -61,6 +61,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
                      {"wobble", options.wobble},
                      {"polish", options.polish},
                      {"firmness", performer.prepared.firmness},
+                     {"load", std::string(settings.spread_load ? "spread" : "usual")},
                      {"seed", std::int64_t{options.seed}}};
   for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
   if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);

@@ -18,7 +18,7 @@ retarget::BodyReport body_report(const retarget::Creature& creature);
 
 /// What creature.toml keeps of a conversion.
 io::CreatureRecord creature_record(const ConvertOptions& options, const retarget::Performer& performer, const retarget::RunReport& report,
-                                   const std::optional<ChosenStep>& chosen, const retarget::Feedback& feedback, int nodes);
+                                   const std::optional<ChosenStep>& chosen, const retarget::Feedback& feedback, const retarget::CreatureOptions& settings);
 
 /// `before` and `after` have an open loop.
 retarget::PolishReport polish_report(int rounds, const retarget::Performances& before, const retarget::Performances& after);

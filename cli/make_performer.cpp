@@ -9,8 +9,9 @@
 
 namespace hydrostat::cli {
 
-retarget::PreparedTarget prepared_target(const retarget::Creature& creature, const retarget::ImportedMotion& motion, double firmness) {
-  retarget::PreparedTarget prepared = retarget::prepare_standing(creature, motion, firmness);
+retarget::PreparedTarget prepared_target(const retarget::Creature& creature, const retarget::ImportedMotion& motion,
+                                         const retarget::CreatureOptions& options) {
+  retarget::PreparedTarget prepared = retarget::prepare_standing(creature, motion, options);
   retarget::find_legs(creature.character.skeleton, prepared.contacts);
   return prepared;
 }

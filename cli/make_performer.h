@@ -7,8 +7,9 @@
 
 namespace hydrostat::cli {
 
-/// The target that the creature is to move by, with what touches the ground and which of it are legs. `firmness`: see PrepareOptions.
-retarget::PreparedTarget prepared_target(const retarget::Creature& creature, const retarget::ImportedMotion& motion, double firmness = 1);
+/// The target that the creature is to move by, with what touches the ground and which of it are legs.
+retarget::PreparedTarget prepared_target(const retarget::Creature& creature, const retarget::ImportedMotion& motion,
+                                         const retarget::CreatureOptions& options);
 
 /// The creature as its replays need it; self-contact is planned.
 retarget::Performer make_performer(const retarget::Creature& creature, const retarget::ImportedMotion& motion,

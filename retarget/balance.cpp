@@ -202,15 +202,16 @@ class Rows {
 /// Unknowns: 6 per frame (move, turn), then the forces in weights, frame after frame, not negative.
 BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts,
                                   const Centroidal& now, const std::vector<FrameBalance>& balances, double length,
-                                  const ShiftCosts& costs) {
+                                  const ShiftCosts& costs, const Shift& so_far) {
   const long frames = target.count();
   const double rate_squared = target.rate_hz * target.rate_hz, g = scene.gravity.norm(), w = kBalanceWeight;
-  const double weight = scene.body.mass.sum() * g, bend = kBendWeight * std::pow(target.rate_hz / 60, 3);
+  const double weight = scene.body.mass.sum() * g, place = costs.shift * kShiftWeight, bend = kBendWeight * std::pow(target.rate_hz / 60, 3);
   const std::vector<double> second = {1, -2, 1}, third = {-0.5, 1, 0, -1, 0.5};
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
   BoundedLeastSquares problem;
   for (long c = 0; c <= 6 * frames; c += 3) problem.column_blocks.push_back(static_cast<int>(c));
   Rows rows(target, problem);
+  std::vector<long> shift_rows;  // the first of each frame's twelve that cost shift and turn
   long column = 6 * frames;
   for (long f = 0; f < frames; ++f) {
     const FrameBalance& frame = balances[static_cast<std::size_t>(f)];
@@ -230,16 +231,23 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     }
     column += forces;
     const long still = rows.next();
-    rows.add_block(still, f, 0, kShiftWeight / length * identity);
-    rows.add_block(still + 3, f, 3, kShiftWeight * identity);
-    rows.add_stencil(still + 6, f, 0, bend / length * identity, third);
-    rows.add_stencil(still + 9, f, 3, bend * identity, third);
+    shift_rows.push_back(still);
+    rows.add_block(still, f, 0, place / length * identity);
+    rows.add_block(still + 3, f, 3, place * identity);
+    rows.add_stencil(still + 6, f, 0, costs.shift * bend / length * identity, third);
+    rows.add_stencil(still + 9, f, 3, costs.shift * bend * identity, third);
     if (costs.jerk > 0) rows.add_stencil(still + 12, f, 0, costs.jerk * bend / length * identity, third);
     Eigen::VectorXd wanted = Eigen::VectorXd::Zero(costs.jerk > 0 ? 15 : 12);
     if (costs.jerk > 0) wanted.tail<3>() = -costs.jerk * bend / length * jerk_of(now.com, target, f, third);
     rows.end_block(wanted);
   }
   rows.finish(column);
+  if (so_far.move.cols() > 0) {
+    Eigen::VectorXd before = Eigen::VectorXd::Zero(column);
+    before.head(6 * frames).reshaped(6, frames) << so_far.move, so_far.turn;
+    const Eigen::VectorXd cost = problem.jacobian * before;
+    for (const long row : shift_rows) problem.target.segment<12>(row) -= cost.segment<12>(row);
+  }
   problem.lower = Eigen::VectorXd::Constant(column, -std::numeric_limits<double>::infinity());
   problem.upper = -problem.lower;
   problem.lower.tail(column - 6 * frames).setZero();
@@ -275,10 +283,10 @@ std::vector<ContactGenerator> contact_generators(const ContactSchedule& contacts
 }
 
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots, const ShiftCosts& costs) {
+                 double support_friction, int max_pivots, const ShiftCosts& costs, const Shift& so_far) {
   const Centroidal now = centroidal(target, scene.body);
   const std::vector<FrameBalance> balances = frame_balances(target, now, scene, contacts, length, support_friction);
-  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, costs);
+  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, costs, so_far);
   const long frames = target.count(), forces = problem.lower.size() - 6 * frames;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(problem.lower.size());
   start.tail(forces).setConstant(1e-3);
@@ -299,6 +307,15 @@ Shift find_shift(const Motion& target, const physics::Scene& scene, const Contac
   }
   shift.badness = rms(missing.topRows<3>()) + rms(missing.bottomRows<3>()) + rms(shift.move) / length;
   return shift;
+}
+
+void add(const Shift& shift, Shift& so_far) {
+  if (so_far.move.cols() == 0) {
+    so_far = shift;
+    return;
+  }
+  so_far.move += shift.move;
+  so_far.turn += shift.turn;
 }
 
 Motion shifted(const Motion& motion, const Shift& shift, const physics::Body& body) {

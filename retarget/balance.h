@@ -29,13 +29,18 @@ struct Shift {
 struct ShiftCosts {
   double forces = 1;  // share of the usual cost of contact forces, which lets loads come and go gently
   double jerk = 0;    // of the COM's own path, per cost of the shift's jerk: a landing is spread over the frames that can bear it
+  double shift = 1;   // share of the usual cost of shift and turn: the less they cost the wider the load is spread over what bears
 };
 
 /// The least shift of the COM and turn of the trunk with which gravity, contact forces inside the friction pyramid and momentum, linear
-/// and angular, balance in every frame. length [m] is L. Source: Kajita's and Wensing's centroidal balance in the form of the design,
-/// section 5; weights measured on our clips.
+/// and angular, balance in every frame. length [m] is L. What `so_far` has moved and turned before is counted with it: the sum of both is
+/// to be least; by default there is none. Source: Kajita's and Wensing's centroidal balance in the form of the design, section 5; weights
+/// measured on our clips.
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots = 60, const ShiftCosts& costs = {});
+                 double support_friction, int max_pivots = 60, const ShiftCosts& costs = {}, const Shift& so_far = {});
+
+/// Adds a shift to what has been moved and turned before (turns are small).
+void add(const Shift& shift, Shift& so_far);
 
 /// The motion with every frame moved and turned about its COM.
 Motion shifted(const Motion& motion, const Shift& shift, const physics::Body& body);

@@ -23,7 +23,8 @@ struct CreatureOptions {
   int nodes = 0;               // 0: automatic
   RootMotion root_motion = RootMotion::kAuto;
   double limit = 0;            // of |activation - 1|; 0: automatic
-  double firmness = 1;         // of the preparation, see PrepareOptions
+  double firmness = 1;         // of the preparation, as is the next, see PrepareOptions
+  bool spread_load = false;
   double density = 1000;       // [kg/m3]
   double softness = 0.005;     // rho g L / E
   bool hexahedra = false;      // the lattice's cells are the elements, not the tets they are cut into: not of springs

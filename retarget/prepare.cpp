@@ -29,6 +29,8 @@ constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at b
 constexpr double kReachOut = 1.0 / 60;  // [s] that its feet come down still earlier
 constexpr double kReachInFlight = 0.065;  // strain that its shape is held back less where nothing bears,
 constexpr double kClearOfGround[] = {1.0 / 60, 0.1};  // [s] from the last contact on and until so long before the next
+constexpr double kSpreadShift = 0.15;   // share of the usual cost of the shift where load is spread
+constexpr int kSpreadRounds = 8;        // after which some 1e-4 m g are missing where contact can give all at all
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
 
 double rms_difference(const Motion& a, const Motion& b, const Eigen::VectorXd& mass) {
@@ -211,8 +213,13 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
   const Motion before_momentum = target;
   Motion wanted = locked;  // the animator's shape with the shifts so far
-  for (int round = 0; options.momentum && round < options.rounds; ++round) {
-    const Shift shift = find_shift(target, scene, contacts, length, result.support_friction, 60, is_far_leap ? kLeapCosts : ShiftCosts());
+  ShiftCosts costs = is_far_leap ? kLeapCosts : ShiftCosts();
+  if (options.spread_load) costs.shift = kSpreadShift;
+  Shift so_far;
+  for (int round = 0; options.momentum && round < (options.spread_load ? kSpreadRounds : options.rounds); ++round) {
+    // Few rounds that each forget the last keep some margin, too, for they lean on; where the load is spread they end in balance.
+    const Shift shift = find_shift(target, scene, contacts, length, result.support_friction, 60, costs, options.spread_load ? so_far : Shift());
+    add(shift, so_far);
     wanted = shifted(wanted, shift, body);
     target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
     fall_freely(contacts, scene, target);

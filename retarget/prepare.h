@@ -10,6 +10,7 @@ struct PrepareOptions {
   double smooth_hz = 10;         // cut-off of the smoothing (half amplitude)
   double support_friction = 0.7; // of the ground's friction that the plan may use; 5 % more in a far leap
   double firmness = 1;           // of the pull to the animator's shape, against springs that would be rid of their stress
+  bool spread_load = false;      // over all that bears, which keeps the middle of pressure off its edge and moves the clip further
   int rounds = 3;                // of volume and momentum
   double clearance = 0.015;      // per D: what is not in contact stays that far above the ground, fading towards contacts
   int clearance_frames = 4;      // over which it fades

@@ -12,9 +12,10 @@ constexpr double kLess = 0.5;        // of the shift: so much less is worth the 
 constexpr double kMissing = 0.01;    // [m g] of missing force that does not count
 
 PreparedTarget prepare_with(const Eigen::VectorXd& mass, const Creature& creature, const ImportedMotion& imported,
-                            double firmness) {
+                            const CreatureOptions& wished) {
   PrepareOptions options = prepare_options(imported);
-  options.firmness = firmness;
+  options.firmness = wished.firmness;
+  options.spread_load = wished.spread_load;
   physics::Scene scene = preparation_scene(creature);
   scene.body.mass = mass;
   return prepare(imported.nodes, scene, bones_of(creature.contacts), creature.character.skeleton.names, creature.mesh.bone_weights,
@@ -37,14 +38,14 @@ std::string told(const StaticBalance& balance, const Creature& creature) {
 
 }  // namespace
 
-PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& imported, double firmness) {
+PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& imported, const CreatureOptions& options) {
   const Eigen::VectorXd& mass = creature.scene.body.mass;
-  PreparedTarget prepared = prepare_with(mass, creature, imported, firmness);
+  PreparedTarget prepared = prepare_with(mass, creature, imported, options);
   if (prepared.report.total_shift_rms_length <= kMostShift) return prepared;
   const StaticBalance balance =
       balance_statically(imported.nodes, imported.skin_points, mass, ContactOptions().height * creature.size);
   if (balance.overhang == 0 || !balance.stands) return prepared;
-  PreparedTarget lighter = prepare_with(mass.cwiseProduct(balance.mass_shares), creature, imported, firmness);
+  PreparedTarget lighter = prepare_with(mass.cwiseProduct(balance.mass_shares), creature, imported, options);
   const bool is_better = lighter.report.total_shift_rms_length < kLess * prepared.report.total_shift_rms_length &&
                          lighter.report.missing_wrench_rms_mg < prepared.report.missing_wrench_rms_mg + kMissing;
   if (!is_better) return prepared;

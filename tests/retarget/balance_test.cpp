@@ -82,6 +82,41 @@ TEST(FindShift, LeavesABalancedBodyWhereItIs) {
   EXPECT_LT(shift.badness, 1e-3);
 }
 
+/// What lies above the soles goes with a shift; they stay.
+Motion leaned(const BoxCreature& creature, const Motion& motion, const Shift& shift) {
+  Motion result = shifted(motion, shift, creature.scene.body);
+  for (int i = 0; i < creature.scene.body.node_count(); ++i) {
+    if (creature.scene.body.rest(1, i) < 0.05) result.frames.middleRows<3>(3 * i) = motion.frames.middleRows<3>(3 * i);
+  }
+  return result;
+}
+
+TEST(FindShift, CountsWhatWasShiftedBefore) {
+  // On its right feet alone a box leans over them. Once it does nothing more is to be won, but if what it has leaned is forgotten it goes
+  // on leaning, for that spreads the load.
+  const BoxCreature creature = make_box_creature();
+  for (const Eigen::Index frames : {12, 18, 24}) {
+    SCOPED_TRACE(std::to_string(frames) + " frames");
+    ContactSchedule contacts = always_standing(creature, frames);
+    for (std::size_t k = 0; k < contacts.patches.size(); ++k) {
+      if (contacts.patches[k].name.find("left") == std::string::npos) continue;
+      contacts.state[k].assign(static_cast<std::size_t>(frames), ContactState::kOff);
+      for (const int p : contacts.patches[k].points) contacts.touching.row(p).setConstant(false);
+    }
+    Motion motion = standing(creature, frames);
+    Shift so_far;
+    for (int round = 0; round < 6; ++round) {
+      const Shift shift = find_shift(motion, creature.scene, contacts, 1, 0.7, 60, {}, so_far);
+      add(shift, so_far);
+      motion = leaned(creature, motion, shift);
+    }
+    const Shift counted = find_shift(motion, creature.scene, contacts, 1, 0.7, 60, {}, so_far);
+    const Shift forgotten = find_shift(motion, creature.scene, contacts, 1, 0.7);
+    EXPECT_GT(so_far.move.norm(), 0.1);
+    EXPECT_LT(counted.move.norm(), 0.1 * forgotten.move.norm());
+  }
+}
+
 /// A box that comes down on its four soles and stops within a frame; it lands in frame `landing` with `speed` [m/s].
 Motion dropped(const BoxCreature& creature, Eigen::Index frames, Eigen::Index landing, double speed) {
   return played(creature, frames, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {

@@ -13,6 +13,7 @@
 #include "retarget/cpu_seconds.h"
 #include "retarget/inverse_dynamics.h"
 #include "retarget/level_cost.h"
+#include "retarget/level_target.h"
 #include "retarget/step_cost.h"
 #include "retarget/tensor_field.h"
 #include "tests/retarget/shapes.h"
@@ -194,6 +195,27 @@ TEST(AtLevel, StandsWhereTheSolvedCreatureDoes) {
     const Eigen::VectorXd played = signal::synthesise_samples(level.signals.activation, level.signals.samples()).row(0);
     const Eigen::Matrix3Xd& rest = scene.body.rest;
     EXPECT_LT(moved(scene, rest, played), 0.2 * moved(scene, rest, Eigen::VectorXd::Ones(played.size()))) << nodes;
+  }
+}
+
+// A shape that has too much volume is held against the tets, which want theirs, as firmly as the solved one was.
+TEST(AtLevel, HoldsOnToTheSolvedShapeByItsFirmness) {
+  Solved solved = standing_block(90);
+  PreparedTarget& prepared = solved.performer.prepared;
+  const Eigen::Vector3d stretch(1, 1.1, 1);
+  for (Eigen::Index f = 0; f < prepared.target.count(); ++f) prepared.target.at(f) = stretch.asDiagonal() * prepared.target.at(f).eval();
+  for (const int nodes : {40, 120}) {
+    if (kSanitized && nodes > 40) continue;
+    const Creature level = make_creature({solved.rig.skeleton, solved.rig.skin, {}}, options_for(nodes, false));
+    const auto missed = [&](double firmness) {  // [m] of the stretched height, in the mean
+      prepared.firmness = firmness;
+      const PreparedTarget carried = carried_target(solved.performer, solved.rig, level);
+      EXPECT_EQ(carried.firmness, firmness);
+      return (stretch.asDiagonal() * level.mesh.nodes - carried.target.at(0)).row(1).mean();
+    };
+    const double loose = missed(1), firm = missed(30);
+    EXPECT_GT(loose, 0.01) << nodes;
+    EXPECT_LT(firm, 0.9 * loose) << nodes;  // measured: 0.84, 0.67
   }
 }
 

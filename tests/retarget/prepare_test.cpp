@@ -246,6 +246,46 @@ TEST(Prepare, LeansABodyOverTheFeetItStandsOn) {
   EXPECT_LT(lacks(target), 0.1 * lacks(given));
 }
 
+/// A loop in which the box paces: for a third of it it stands on its right legs alone, for a third on its left.
+Motion pacing(const BoxCreature& creature, Eigen::Index frames) {
+  return played(creature, frames, true, [frames](const Eigen::Vector3d& x, Eigen::Index f) {
+    const double phase = 2 * M_PI * static_cast<double>(f) / static_cast<double>(frames);
+    const double rise = std::clamp((x.z() > 0.2 ? 1 : -1) * 2 * std::sin(phase) - 1, 0.0, 1.0);
+    return Eigen::Vector3d(x + Eigen::Vector3d(0, x.y() < 0.05 ? 0.06 * rise : 0, 0));
+  });
+}
+
+/// Where it stands on its right or left feet alone: how far the centre of mass is from the middle of their soles sideways, in the mean [m].
+double overhang(const BoxCreature& creature, const PreparedTarget& plan) {
+  const Motion points = point_motion(creature.scene.contact_points, plan.target);
+  double sum = 0;
+  int count = 0;
+  for (Eigen::Index f = 0; f < plan.target.count(); ++f) {
+    double middle = 0, bearing = 0;
+    for (Eigen::Index p = 0; p < plan.contacts.touching.rows(); ++p) {
+      if (plan.contacts.touching(p, f)) middle += points.at(f)(2, p), ++bearing;
+    }
+    if (bearing == 0 || std::abs(middle / bearing - 0.2) < 0.1) continue;  // in the air, or on both sides
+    sum += std::abs(physics::centre_of_mass(creature.scene.body, plan.target.at(f)).z() - middle / bearing);
+    ++count;
+  }
+  return sum / count;
+}
+
+TEST(Prepare, ASpreadLoadIsBalancedFurtherInside) {
+  const BoxCreature creature = make_box_creature();
+  for (const Eigen::Index frames : {48, 60}) {
+    SCOPED_TRACE(std::to_string(frames) + " frames");
+    const Motion motion = pacing(creature, frames);
+    PrepareOptions spread;
+    spread.spread_load = true;
+    const PreparedTarget usual = prepared(creature, motion), wide = prepared(creature, motion, spread);
+    EXPECT_LT(wide.report.missing_wrench_max_mg, 2e-3);
+    EXPECT_LT(overhang(creature, wide), 0.98 * overhang(creature, usual));
+    EXPECT_GT(wide.report.total_shift_rms_length, usual.report.total_shift_rms_length);  // what it costs
+  }
+}
+
 TEST(Prepare, ABodyThatNeverTouchesLacksItsWholeWeight) {
   const BoxCreature creature = make_box_creature();
   Motion motion = standing(creature, 12);

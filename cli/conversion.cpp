@@ -90,8 +90,8 @@ void Conversion::stay_up(const io::ImportedCharacter& imported, double wished_li
     take_over(*spread);
     char text[300];
     std::snprintf(text, sizeof text,
-                  "the creature falls where the clip is moved as little as balance allows, by %.1f %% L: it is moved by %.1f %% L, which spreads "
-                  "its load over more of what bears it, and stays up",
+                  "the creature falls by the usual preparation, which moves the clip by %.1f %% L: it is moved by %.1f %% L, which spreads its load over "
+                  "more of what bears it, and stays up",
                   100 * usual_shift, 100 * target_.report.preparation.total_shift_rms_length);
     add_warnings({text});
     return 0;

@@ -74,7 +74,8 @@ class Conversion {
   /// Solved on a mesh of so many wished nodes; none where the clip cannot be solved on it.
   std::unique_ptr<Conversion> on_coarser_mesh(const io::ImportedCharacter& imported, double wished_limit, int wished, Stages& stages);
 
-  void take_over(Conversion& coarser);
+  /// Puts the other, which was solved and let go, in the place of what is here.
+  void take_over(Conversion& other);
 
   void cut_signals();
 

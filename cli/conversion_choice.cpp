@@ -138,19 +138,19 @@ std::unique_ptr<Conversion> Conversion::on_coarser_mesh(const io::ImportedCharac
   return coarser;
 }
 
-void Conversion::take_over(Conversion& coarser) {
-  settings_ = coarser.settings_;
-  key_ = coarser.key_;
-  solved_key_ = coarser.solved_key_;
-  creature_ = std::move(coarser.creature_);
-  motion_ = std::move(coarser.motion_);
-  inverse_ = std::move(coarser.inverse_);
-  target_ = std::move(coarser.target_);
-  signals_ = std::move(coarser.signals_);
-  whole_signals_ = std::move(coarser.whole_signals_);
-  performances_ = std::move(coarser.performances_);
-  target_file_ = std::move(coarser.target_file_);
-  signals_text_ = std::move(coarser.signals_text_);
+void Conversion::take_over(Conversion& other) {
+  settings_ = other.settings_;
+  key_ = other.key_;
+  solved_key_ = other.solved_key_;
+  creature_ = std::move(other.creature_);
+  motion_ = std::move(other.motion_);
+  inverse_ = std::move(other.inverse_);
+  target_ = std::move(other.target_);
+  signals_ = std::move(other.signals_);
+  whole_signals_ = std::move(other.whole_signals_);
+  performances_ = std::move(other.performances_);
+  target_file_ = std::move(other.target_file_);
+  signals_text_ = std::move(other.signals_text_);
   is_performed_ = true;
 }
 

@@ -146,7 +146,7 @@ SpeedRow measure(const SpeedCommand& command, const retarget::Character& charact
   row.frames = static_cast<int>(motion.nodes.count());
   retarget::PreparedTarget prepared;
   row.preparation_ms = ms_of(prepared, [&] { return prepared_target(creature, motion, settings); });
-  retarget::lighten(prepared, creature.scene.body);
+  retarget::fit_body(prepared, creature.scene.body);
   retarget::InverseOptions inverse_options;
   inverse_options.threads = 1;
   retarget::InverseDynamics inverse;

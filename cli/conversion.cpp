@@ -118,7 +118,8 @@ void Conversion::find_activations(double wished_limit) {
   const physics::Scene& scene = creature_.scene;
   key_ = key_after(key_, options_.friction, settings_.firmness, std::int64_t{settings_.spread_load});
   retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_, settings_); });
-  retarget::lighten(prepared, creature_.scene.body);
+  retarget::fit_body(prepared, creature_.scene.body);
+  creature_.youngs_modulus *= prepared.stiffness;
   retarget::InverseOptions inverse_options;
   inverse_options.limit = wished_limit;
   inverse_options.threads = options_.threads;

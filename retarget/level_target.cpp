@@ -9,6 +9,7 @@
 
 #include "retarget/balance.h"
 #include "retarget/mesh_places.h"
+#include "retarget/sag.h"
 #include "retarget/shape_projection.h"
 
 namespace hydrostat::retarget {
@@ -220,9 +221,11 @@ void project(const Creature& level, double size, PreparedTarget& prepared) {
 PreparedTarget carried_target(const Performer& solved, const Rig& rig, const Creature& level) {
   PreparedTarget prepared = solved.prepared;
   prepared.mass_shares.resize(0);  // they are the solved mesh's; the level's masses have them already
+  prepared.stiffness = 1;
   prepared.target = carried_motion(solved, rig, level);
   prepared.contacts = carried_contacts(solved.prepared.contacts, rig.skeleton, level);
   project(level, solved.size, prepared);
+  prepared.stiffness = stiffness_to_bear(sag(preparation_scene(level), prepared, level.length));
   return prepared;
 }
 

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "physics/element_body.h"
+#include "retarget/sag.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -108,15 +109,10 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
   physics::Scene varied = scene;
   varied.body.mass *= variation.mass;
   varied.ground.friction *= variation.friction;
-  varied.body.edge_stiffness *= variation.stiffness;
-  varied.body.volume_stiffness *= variation.stiffness;
-  varied.body.edge_damping *= variation.stiffness;
+  stiffen(variation.stiffness, varied.body);
   for (physics::BodyElements<3>& elements : varied.body.elements) {
     physics::ElementMesh<3> mesh = physics::mesh_of(varied.body, elements);
-    for (physics::ElementMaterial& material : mesh.materials) {
-      material.density *= variation.mass;
-      material.youngs_modulus *= variation.stiffness;
-    }
+    for (physics::ElementMaterial& material : mesh.materials) material.density *= variation.mass;
     elements = physics::make_body_elements(mesh, elements.block.law);
   }
   return varied;

@@ -29,6 +29,7 @@ struct PreparedTarget {
   std::vector<std::string> warnings;
   double support_friction = 0.7;   // of the ground's friction that it uses
   double firmness = 1;             // by which it was prepared, in times the usual
+  double stiffness = 1;            // of the body that carries its weight, in times the usual
 };
 
 /// Smooths, locks feet, restores volume and shifts the centre of mass and turns the trunk until gravity, contact forces inside

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "retarget/sag.h"
 #include "retarget/static_balance.h"
 
 namespace hydrostat::retarget {
@@ -36,9 +37,7 @@ std::string told(const StaticBalance& balance, const Creature& creature) {
   return text;
 }
 
-}  // namespace
-
-PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& imported, const CreatureOptions& options) {
+PreparedTarget prepare_balanced(const Creature& creature, const ImportedMotion& imported, const CreatureOptions& options) {
   const Eigen::VectorXd& mass = creature.scene.body.mass;
   PreparedTarget prepared = prepare_with(mass, creature, imported, options);
   if (prepared.report.total_shift_rms_length <= kMostShift) return prepared;
@@ -54,8 +53,26 @@ PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& 
   return lighter;
 }
 
-void lighten(const PreparedTarget& prepared, physics::Body& body) {
+}  // namespace
+
+PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& imported, const CreatureOptions& options) {
+  PreparedTarget prepared = prepare_balanced(creature, imported, options);
+  physics::Scene scene = preparation_scene(creature);
+  fit_body(prepared, scene.body);
+  const double usual = sag(scene, prepared, creature.length);
+  prepared.stiffness = stiffness_to_bear(usual);
+  if (prepared.stiffness > 1) {
+    char text[200];
+    std::snprintf(text, sizeof text, "the body is made %.2f times as stiff as usual, for by its weight it would sink by %.1f %% L", prepared.stiffness,
+                  100 * usual);
+    prepared.warnings.push_back(text);
+  }
+  return prepared;
+}
+
+void fit_body(const PreparedTarget& prepared, physics::Body& body) {
   if (prepared.mass_shares.size() > 0) body.mass = body.mass.cwiseProduct(prepared.mass_shares).eval();
+  if (prepared.stiffness != 1) stiffen(prepared.stiffness, body);
 }
 
 }  // namespace hydrostat::retarget

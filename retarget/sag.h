@@ -13,7 +13,7 @@ double sag(const physics::Scene& scene, const PreparedTarget& prepared, double l
 /// How many times as stiff the body has to be, so that it sinks by kMostSag at most: 1 or more. Legs that sink further buckle: what they
 /// bear takes away more of their stiffness than feedback makes good (a spider on 782 nodes, 9 % of L).
 double stiffness_to_bear(double sag);
-constexpr double kMostSag = 0.03;  // of L
+constexpr double kMostSag = 0.02;  // of L
 
 /// Springs, volumes, dashpots and elements, by a factor.
 void stiffen(double factor, physics::Body& body);

@@ -54,7 +54,7 @@ double sag(const physics::Scene& scene, const PreparedTarget& prepared, double l
   return *middle;
 }
 
-double stiffness_to_bear(double sag) { return std::max(1.0, sag / kMostSag); }
+double stiffness_to_bear(double sag) { return std::clamp(sag / kMostSag, 1.0, kMostStiffening); }
 
 void stiffen(double factor, physics::Body& body) {
   body.edge_stiffness *= factor;

@@ -10,10 +10,12 @@ namespace hydrostat::retarget {
 /// length [m] is L; `scene` has the body's springs (preparation_scene).
 double sag(const physics::Scene& scene, const PreparedTarget& prepared, double length);
 
-/// How many times as stiff the body has to be, so that it sinks by kMostSag at most: 1 or more. Legs that sink further buckle: what they
-/// bear takes away more of their stiffness than feedback makes good (a spider on 782 nodes, 9 % of L).
+/// How many times as stiff the body has to be, so that it sinks by kMostSag at most: from 1 to kMostStiffening, for what touches the ground
+/// with a fingertip alone does not stand on it. Legs that sink further buckle: what they bear takes away more of their stiffness than
+/// feedback makes good (a spider on 782 nodes, 9 % of L).
 double stiffness_to_bear(double sag);
 constexpr double kMostSag = 0.02;  // of L
+constexpr double kMostStiffening = 8;
 
 /// Springs, volumes, dashpots and elements, by a factor.
 void stiffen(double factor, physics::Body& body);

@@ -102,6 +102,11 @@ TEST(Stiffen, MultipliesTheForcesOfElementsAndSprings) {
   }
 }
 
+/// Something that grows with the body's stiffness as a factor does.
+double stiffness_of(const physics::Body& body) {
+  return body.elements.empty() ? body.edge_stiffness.sum() : body.elements[0].materials[0].youngs_modulus;
+}
+
 /// A block of 1 x 0.4 x 0.5 m on one bone that stands for a second.
 Character block() {
   Character character;
@@ -128,12 +133,9 @@ TEST(PrepareStanding, MakesASoftBodyAsStiffAsItsWeightAsks) {
       EXPECT_EQ(prepared.stiffness > 1, softness > 1);
       EXPECT_LE(sag(springs, prepared, creature.length), kMostSag + 1e-9);
       EXPECT_EQ(prepared.warnings.empty(), softness < 1);
-      const double before = creature.scene.body.elements.empty() ? creature.scene.body.edge_stiffness.sum()
-                                                                 : creature.scene.body.elements[0].materials[0].youngs_modulus;
+      const double before = stiffness_of(creature.scene.body);
       fit_body(prepared, creature.scene.body);
-      const double after = creature.scene.body.elements.empty() ? creature.scene.body.edge_stiffness.sum()
-                                                                : creature.scene.body.elements[0].materials[0].youngs_modulus;
-      EXPECT_NEAR(after / before, prepared.stiffness, 1e-9);
+      EXPECT_NEAR(stiffness_of(creature.scene.body) / before, prepared.stiffness, 1e-9);
     }
   }
 }

@@ -101,6 +101,7 @@ TEST(ThirdPartyClips, TheSnakeWindsAndKeepsItsWay) {
     EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), kDrift);
   });
 }
+
 /// As it is drawn it tips over the strip of belly that it stands on.
 TEST(ThirdPartyClips, TheSnakeRaisesItsHeadOverASpreadLoad) {
   const auto look_at = [](const fs::path& creature) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <random>
 
 #include "retarget/contact_loads.h"
@@ -229,6 +230,61 @@ TEST(CostToGo, KnowsWhatALastingDisturbanceAdds) {
     const double added = least(z, disturbance) - least(z, none) - least(none, disturbance);
     const double told = 2 * z.dot(cost.at_disturbed(k * kStep).cast<double>() * disturbance);
     EXPECT_NEAR(told, added, 2e-3 * std::sqrt(least(z, none) * least(none, disturbance)));
+  }
+}
+
+/// What a loop that turns has left over at its end costs what it costs in the next period, which begins turned: seen as a replay sees it.
+TEST(CostToGo, PassesTheSeamOfATurningLoop) {
+  constexpr int kModes = 60;
+  constexpr double kFarOff = 0.03;  // share of the costs that lies further ahead than a second
+  for (const double yaw : {0.4, -1.3, 2.5}) {
+    SCOPED_TRACE("yaw " + std::to_string(yaw));
+    Regulated box;
+    box.performer.prepared.target.yaw = yaw;
+    RegulatorOptions options;
+    options.modes = kModes;
+    options.place = 0;  // a place that nothing brings back would cost the more the further one looks ahead
+    const CostToGo cost = find_cost_to_go(box.motion(), kStep, options);
+    ASSERT_TRUE(cost.is_sound());
+    LinearSteps steps(box.performer.scene, box.performer.muscles, cost.modes(), box.performer.length, kStep);
+    const Eigen::Matrix3d heading = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const physics::State reference = box.moment(0, ContactState::kStick).state;
+    const auto in_next_period = [&](const Eigen::VectorXd& z) {
+      physics::State state = reference;
+      state.x += (cost.modes().fields * z.head(kModes)).reshaped(3, state.x.cols());
+      state.v += (cost.modes().fields * z.tail(kModes)).reshaped(3, state.v.cols());
+      return deviation_along(cost.modes(), heading, state, reference, 1, 1);
+    };
+    const long last = std::lround(box.performer.prepared.target.duration_s() / kStep) - 1;
+    const double last_s = static_cast<double>(last) * kStep, mass = box.performer.scene.body.mass.sum();
+    const LinearStep step = steps.at(box.planned(last));
+    const Eigen::MatrixXd next = cost.at(0).cast<double>(), beside = options.last * cost.at_disturbed(0).cast<double>();
+    Eigen::MatrixXd drive = whole_drive(step);
+    for (auto column : drive.colwise()) column = in_next_period(column).eval();
+    Eigen::MatrixXd left = drive.transpose() * next * drive;
+    left.diagonal().array() += options.effort;
+    const auto least = [&](const Eigen::VectorXd& z, const Eigen::VectorXd& disturbance) {
+      const Eigen::VectorXd held = in_next_period(disturbance);
+      const Eigen::VectorXd free = in_next_period(step.after(z, Eigen::VectorXd::Zero(drive.cols()))) + held;
+      const Eigen::VectorXd muscles = -left.ldlt().solve(drive.transpose() * (next * free + beside * held));
+      const Eigen::VectorXd after = free + drive * muscles;
+      return options.effort * muscles.squaredNorm() + after.dot(next * after) + 2 * after.dot(beside * held);
+    };
+    double off = 0, all = 0, off_disturbed = 0, all_disturbed = 0;
+    for (unsigned seed = 0; seed < 5; ++seed) {
+      std::mt19937 random(seed);
+      const Eigen::VectorXd z = 0.01 * random_vector(2 * kModes, random), none = Eigen::VectorXd::Zero(2 * kModes);
+      const Eigen::VectorXd disturbance = 0.01 * random_vector(2 * kModes, random);
+      const double here = (options.place * z.head(kModes).squaredNorm() + options.speed * z.tail(kModes).squaredNorm()) / mass;
+      off += std::abs(here + least(z, none) - cost.of(z, last_s));
+      all += cost.of(z, last_s);
+      const double added = least(z, disturbance) - least(z, none) - least(none, disturbance);
+      const double told = 2 * z.dot(cost.at_disturbed(last_s).cast<double>() * disturbance);
+      off_disturbed += std::abs(told - added);
+      all_disturbed += std::sqrt(least(z, none) * least(none, disturbance));
+    }
+    EXPECT_LE(off, kFarOff * all);
+    EXPECT_LE(off_disturbed, kFarOff * all_disturbed);
   }
 }
 

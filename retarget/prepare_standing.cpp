@@ -37,6 +37,20 @@ std::string told(const StaticBalance& balance, const Creature& creature) {
   return text;
 }
 
+/// `usual` is the sag of the usual body.
+std::string told(double usual, double stiffness) {
+  char text[300];
+  const int size = std::snprintf(text, sizeof text, "the body is made %.2f times as stiff as usual, for by its weight it would sink by %.1f %% L", stiffness,
+                                 100 * usual);
+  const double left = usual / stiffness;
+  if (left > 1.001 * kMostSag) {
+    std::snprintf(text + size, sizeof text - static_cast<std::size_t>(size),
+                  "; stiffer it is not made, and it still sinks by %.1f %%: what bears it may buckle; fewer --nodes make thin legs stouter",
+                  100 * left);
+  }
+  return text;
+}
+
 PreparedTarget prepare_balanced(const Creature& creature, const ImportedMotion& imported, const CreatureOptions& options) {
   const Eigen::VectorXd& mass = creature.scene.body.mass;
   PreparedTarget prepared = prepare_with(mass, creature, imported, options);
@@ -61,12 +75,7 @@ PreparedTarget prepare_standing(const Creature& creature, const ImportedMotion& 
   fit_body(prepared, scene.body);
   const double usual = sag(scene, prepared, creature.length);
   prepared.stiffness = stiffness_to_bear(usual);
-  if (prepared.stiffness > 1) {
-    char text[200];
-    std::snprintf(text, sizeof text, "the body is made %.2f times as stiff as usual, for by its weight it would sink by %.1f %% L", prepared.stiffness,
-                  100 * usual);
-    prepared.warnings.push_back(text);
-  }
+  if (prepared.stiffness > 1) prepared.warnings.push_back(told(usual, prepared.stiffness));
   return prepared;
 }
 

@@ -1,9 +1,10 @@
 // Writes DIR/balance.html from DIR/balance.csv and DIR/frames: a table of survival and medians, survival curves, looping pictures.
-// Prints the table as well. Usage: node page.mjs DIR
+// Prints the table as well; with a README, puts one of the usual variant between its marks. Usage: node page.mjs DIR [README.md]
 import { existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { write_between_marks } from "../../samples/between_marks.mjs";
 
-const directory = process.argv[2];
+const [directory, readme] = process.argv.slice(2);
 const [head, ...lines] = readFileSync(join(directory, "balance.csv"), "utf8").trim().split("\n");
 const names = head.split(",");
 const rows = lines.map((line) => Object.fromEntries(line.split(",").map((value, k) => [names[k], value])));
@@ -39,6 +40,21 @@ const summary = [...grouped.values()].map(({ clip, variant, seeds, pushes }) => 
 const shown = (value) => (typeof value === "number" ? (Number.isNaN(value) ? "-" : String(+value.toPrecision(3))) : value);
 console.table(Object.fromEntries(summary.map(({ clip, variant, ...rest }) => [`${clip} ${variant}`,
   Object.fromEntries(Object.entries(rest).map(([name, value]) => [name, shown(value)]))])));
+
+/** What a page for people wants of the usual variant; clips that fall have no medians of what stays up. */
+function readme_table() {
+  const lines = summary.filter((row) => row.variant === "usual").map((row) => {
+    const cells = ["shape %L", "clip shape %L", "drift %L", "slip %L"].map((name) => Number.isNaN(row[name]) ? "-" : row[name].toFixed(2));
+    const way = Number.isNaN(row.travel) ? "-" : `${(100 * row.travel).toFixed(0)} %`;
+    const { seeds } = grouped.get(`${row.clip},${row.variant}`);
+    const fallen = seeds.filter((one) => one.outcome !== "up").map((one) => Number(one.time_s));
+    const falls = fallen.length === 0 ? "-" : `${Math.min(...fallen).toFixed(1)} to ${Math.max(...fallen).toFixed(1)} s`;
+    return `| \`${row.clip}\` | ${row.up.replace("/", " of ")} | ${falls} | ${cells.join(" | ")} | ${way} | ${row.pushes.replace("/", " of ")} | ${shown(row["x real time"])} |`;
+  });
+  return ["| clip | keeps its feet | falls at | from its plan, % L | from the clip, % L | drift a cycle, % L | slip a stance, % L | way | bears pushes | times real time |",
+          "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |", ...lines].join("\n");
+}
+if (readme) write_between_marks(readme, "tests/balance/run.sh -r", readme_table());
 
 // Survival: the share of the seeds that are still up, over the share of the time that was asked.
 const kColours = ["#2563eb", "#dc2626", "#059669", "#d97706", "#7c3aed", "#0891b2", "#be185d", "#4d7c0f"];

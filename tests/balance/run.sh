@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # The balance bench: how long creatures keep their feet, over clips, seeds, pushes and variants of the corrector.
-#   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-w SCENE] [-j JOBS]
+#   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-w SCENE] [-j JOBS] [-r]
 # Writes DIR/balance.csv and DIR/balance.html (default DIR: out/balance). A run that is there is not run again; one that was
 # broken off goes on where it was. -p SPEED adds, for the plan's body, pushes of so many m/s in 8 directions at 4 phases. -w SCENE lets all go in a
-# creature's scene (README, "A creature's scene").
+# creature's scene (README, "A creature's scene"). -r writes README's table.
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")")
 assets=${HYDROSTAT_ASSETS:-$project/../shared/assets}
-out=$project/out/balance clips="" variants=usual seeds=20 cycles=50 speed="" scene="" jobs=$(nproc)
-while getopts o:c:v:s:n:p:w:j: option; do
+out=$project/out/balance clips="" variants=usual seeds=20 cycles=50 speed="" scene="" jobs=$(nproc) readme=""
+while getopts o:c:v:s:n:p:w:j:r option; do
   case $option in
     o) out=$(realpath -m -- "$OPTARG") ;;
     c) clips=$OPTARG ;;
@@ -18,6 +18,7 @@ while getopts o:c:v:s:n:p:w:j: option; do
     p) speed=$OPTARG ;;
     w) scene=$(realpath -- "$OPTARG") ;;
     j) jobs=$OPTARG ;;
+    r) readme=README.md ;;
     *) exit 2 ;;
   esac
 done
@@ -91,7 +92,7 @@ run_case() {  # out name,variant,seed,push,cycles
   IFS=, read -r name variant seed push cycles <<< "$2"
   frames=(-)
   [ "$seed" != 1 ] || frames=("$1/frames/$name,$variant.json")
-  build/release/tests/balance_run "$1/creatures/$name" "$variant" "$seed" "$push" "$cycles" "${frames[@]}" ${scene:+"$scene"} > "$row.part"
+  build/release/tests/balance_run "$1/creatures/$name" "$variant" "$seed" "$push" "$cycles" "${frames[@]}" ${scene:+"$scene"} > "$row.part" || return 1
   mv -- "$row.part" "$row"
 }
 export -f run_case
@@ -103,6 +104,6 @@ cases | xargs -d '\n' -P "$jobs" -I CASE bash -c 'run_case "$@"' _ "$out" CASE
   cases | while read -r case; do echo "$case,$(cat -- "$out/rows/$case")"; done
 } > "$out/balance.csv.part"
 mv -- "$out/balance.csv.part" "$out/balance.csv"
-node tests/balance/page.mjs "$out"
+node tests/balance/page.mjs "$out" ${readme:+"$readme"}
 echo "$out/balance.csv"
 echo "file://$out/balance.html"

@@ -44,12 +44,12 @@ console.table(Object.fromEntries(summary.map(({ clip, variant, ...rest }) => [`$
 /** What a page for people wants of the usual variant; clips that fall have no medians of what stays up. */
 function readme_table() {
   const lines = summary.filter((row) => row.variant === "usual").map((row) => {
-    const cells = ["shape %L", "clip shape %L", "drift %L", "slip %L"].map((name) => Number.isNaN(row[name]) ? "-" : row[name].toFixed(2));
+    const cells = ["shape %L", "clip shape %L", "drift %L", "slip %L"].map((name) => Number.isNaN(row[name]) ? "-" : Math.abs(row[name]).toFixed(2));
     const way = Number.isNaN(row.travel) ? "-" : `${(100 * row.travel).toFixed(0)} %`;
     const { seeds } = grouped.get(`${row.clip},${row.variant}`);
     const fallen = seeds.filter((one) => one.outcome !== "up").map((one) => Number(one.time_s));
     const falls = fallen.length === 0 ? "-" : `${Math.min(...fallen).toFixed(1)} to ${Math.max(...fallen).toFixed(1)} s`;
-    return `| \`${row.clip}\` | ${row.up.replace("/", " of ")} | ${falls} | ${cells.join(" | ")} | ${way} | ${row.pushes.replace("/", " of ")} | ${shown(row["x real time"])} |`;
+    return `| \`${row.clip}\` | ${row.up.replace("/", " of ")} | ${falls} | ${cells.join(" | ")} | ${way} | ${row.pushes.replace("/", " of ")} | ${row["x real time"].toFixed(1)} |`;
   });
   return ["| clip | keeps its feet | falls at | from its plan, % L | from the clip, % L | drift a cycle, % L | slip a stance, % L | way | bears pushes | times real time |",
           "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |", ...lines].join("\n");

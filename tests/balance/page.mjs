@@ -59,8 +59,13 @@ if (readme) write_between_marks(readme, "tests/balance/run.sh -r", readme_table(
 // Survival: the share of the seeds that are still up, over the share of the time that was asked.
 const kColours = ["#2563eb", "#dc2626", "#059669", "#d97706", "#7c3aed", "#0891b2", "#be185d", "#4d7c0f"];
 const variants = [...new Set(rows.map((row) => row.variant))];
+const kUntilTold = 0.2;  // [s] from a fall on, that count among the cycles of a run
+function asked_s(row) {
+  const simulated = Number(row.time_s) + (row.outcome === "up" ? 0 : kUntilTold);
+  return row.loop === "1" ? Number(row.cycles_wanted) * simulated / Number(row.cycles) : simulated;
+}
 function curve(seeds) {
-  const longest = Math.max(...seeds.map((row) => Number(row.time_s)));
+  const longest = Math.max(...seeds.map(asked_s));
   const falls = seeds.filter((row) => row.outcome === "fell").map((row) => Number(row.time_s) / longest).sort((a, b) => a - b);
   let path = "M0 0";
   falls.forEach((at, k) => (path += `H${(at * 100).toFixed(2)}V${((100 * (k + 1)) / seeds.length).toFixed(2)}`));

@@ -60,6 +60,7 @@ if (readme) write_between_marks(readme, "tests/balance/run.sh -r", readme_table(
 const kColours = ["#2563eb", "#dc2626", "#059669", "#d97706", "#7c3aed", "#0891b2", "#be185d", "#4d7c0f"];
 const variants = [...new Set(rows.map((row) => row.variant))];
 const kUntilTold = 0.2;  // [s] from a fall on, that count among the cycles of a run
+/** How long a run was to last [s]; of a one-shot, how long it did. */
 function asked_s(row) {
   const simulated = Number(row.time_s) + (row.outcome === "up" ? 0 : kUntilTold);
   return row.loop === "1" ? Number(row.cycles_wanted) * simulated / Number(row.cycles) : simulated;

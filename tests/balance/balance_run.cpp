@@ -146,7 +146,8 @@ int run(int argc, char** argv) {
   options.seed = seed;
   options.replay.observation.seed = seed;
   options.variation = kVariation;
-  std::mt19937 random(seed);
+  std::seed_seq of_shoves{seed, 1U};  // not the body's own numbers: or all heavy ones would be shoved the same way
+  std::mt19937 random(of_shoves);
   const double angle = 2 * M_PI * static_cast<double>(random()) / 4294967296.0;
   if (seed != 0) options.replay.pushes.push_back(shove(0, angle, kFirstShove * static_cast<double>(random()) / 4294967296.0));
   if (push != "none") options.replay.pushes.push_back(parse_push(push, target.loop ? target.duration_s() : 0.25));

@@ -225,7 +225,7 @@ retarget::PerformOptions Conversion::perform_options() const {
   if (chosen_) take_steps(result.replay, chosen_->setting);
   result.replay.duration_s = retarget::usual_duration(target_.performer.prepared.target);
   result.feedback = performances_.feedback;
-  result.may_regulate = true;
+  result.is_thorough = true;
   result.seed = options_.seed;
   result.threads = options_.threads;
   return result;
@@ -265,7 +265,10 @@ void Conversion::polish() {
     signals_text_ = io::signals_text(signals_);
     return;
   }
-  if (performances_.wished_lapse == retarget::Lapse::kNothing) performances_.wished_lapse = before.wished_lapse;
+  if (performances_.wished_lapse == retarget::Lapse::kNothing) {
+    performances_.wished_lapse = before.wished_lapse;
+    performances_.trials_lost = before.trials_lost;
+  }
   target_.report.polish = polish_report(polished.report.rounds, before, performances_);
 }
 

@@ -232,7 +232,7 @@ void name_fields(RecordArchive& archive, retarget::Feedback& feedback) {
 void name_fields(RecordArchive& archive, retarget::Performances& performances) {
   archive.fields("naive", performances.naive, "open_loop", performances.open_loop, "closed_loop", performances.closed_loop,
                  "feedback", performances.feedback, "lapse", performances.lapse,
-                 "wished_lapse", performances.wished_lapse);
+                 "wished_lapse", performances.wished_lapse, "trials_lost", performances.trials_lost);
 }
 
 void name_fields(RecordArchive& archive, retarget::SourceReport& report) {

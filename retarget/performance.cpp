@@ -22,6 +22,7 @@ constexpr double kCircle = 10 * M_PI / 180;  // by which a clip turns before its
 // some bodies are lost that it holds alone. The quick ones keep bodies up whose feet slide under the usual gain.
 constexpr Feedback kOthers[] = {{},
                                 {.regulator = 1e-3},
+                                {.regulator = 1e-2},
                                 {.regulator = 1},
                                 {.effort = 1, .horizon = 0.6, .root_weight = 4.0 / 3},
                                 {.effort = 1, .horizon = 0.5, .root_weight = 10.0 / 3},
@@ -87,6 +88,19 @@ double straying(const Performer& performer, const ReplayOptions& options, const 
   return std::max(travel, drift);
 }
 
+/// Whether one of kTrials stays up, by the options' feedback.
+bool stands(const Trial& trial, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  ReplayOptions shoved = options.replay;
+  shoved.correct = true;
+  shoved.trace = false;
+  shoved.lesson = nullptr;
+  shoved.corrector = with(options.feedback, options.replay.corrector);
+  Push& shove = shoved.pushes.emplace_back();
+  shove.delta_v = kTrialShove * Eigen::Vector3d(std::cos(trial.angle), 0, std::sin(trial.angle));
+  const Replay replay = run(performer, varied_scene(performer.scene, trial.body), signals_of(signals), signals.limit, shoved, &performer.path);
+  return !replay.report.fell && replay.termination == physics::Termination::kDone;
+}
+
 Lapse lapse_of(double straying) {
   if (straying == HUGE_VAL) return Lapse::kFell;
   return straying > 1 ? Lapse::kLostWay : Lapse::kNothing;
@@ -144,6 +158,15 @@ Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const R
   return lapse_of(straying(performer, options, run));
 }
 
+int count_trials_lost(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  const auto falls = [&](const Trial& trial) { return !stands(trial, performer, signals, options); };
+  const auto half = kTrials.begin() + kTrials.size() / 2;
+  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred,
+                           [&] { return std::count_if(kTrials.begin(), half, falls); });
+  const auto here = std::count_if(half, kTrials.end(), falls);
+  return static_cast<int>(here + beside.get());
+}
+
 Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
   Performances result = perform(performer, signals, options);
   if (!options.closed_loop) return result;
@@ -152,13 +175,17 @@ Performances perform_steadily(const Performer& performer, const SignalSet& signa
   PerformOptions other = options;
   other.baselines = false;
   for (const Feedback& feedback : kOthers) {
-    if (least <= 1) break;
-    if (feedback == options.feedback || (feedback.regulator > 0 && !options.may_regulate)) continue;
+    const bool is_well = least <= 1;
+    if (is_well && result.trials_lost == 0) break;
+    if (feedback == options.feedback || (feedback.regulator > 0 && !options.is_thorough)) continue;
     other.feedback = feedback;
     Performances next = perform(performer, signals, other);
     const double its = straying(performer, options.replay, next.main());
-    if (its > 1 && its >= kBetter * least) continue;
+    if (its > 1 && (is_well || its >= kBetter * least)) continue;
+    const int lost = its <= 1 && options.is_thorough ? count_trials_lost(performer, signals, other) : 0;
+    if (is_well && lost >= result.trials_lost) continue;
     least = its;
+    result.trials_lost = lost;
     result.closed_loop = std::move(next.closed_loop);
     result.feedback = feedback;
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <numbers>
 #include <optional>
 
 #include "retarget/control_mesh.h"
@@ -40,7 +42,7 @@ struct PerformOptions {
   unsigned seed = 0;       // 0: the body as it was planned; else see variation_of
   double variation = 0.02; // how far a seed's body may differ from the plan
   bool closed_loop = true; // false: the open loop is the main run
-  bool may_regulate = false;  // perform_steadily: a regulator is among what is tried; it takes time that levels' budgets do not count
+  bool is_thorough = false;  // perform_steadily: tries regulators and what bodies off the plan say; takes time that levels' budgets do not count
   bool baselines = true;   // naive, and the open loop beside the closed one
   int threads = 2;         // two let the baselines run beside the main run; the outcome does not hang on it
 };
@@ -55,6 +57,7 @@ struct Performances {
   Feedback feedback;  // of the closed loop
   // Told by perform_steadily: what the closed loop comes short of, and what it did on the feedback that was wished.
   Lapse lapse = Lapse::kNothing, wished_lapse = Lapse::kNothing;
+  int trials_lost = 0;  // and how many of kTrials fell on what took its place; 0 where that was not asked
 
   /// The closed loop where there is one, else the open loop.
   const Replay& main() const { return closed_loop ? *closed_loop : *open_loop; }
@@ -68,6 +71,19 @@ struct Variation {
 /// Factors drawn evenly within `most` of 1 by the seed; seed 0 is exactly 1.
 Variation variation_of(unsigned seed, double most = PerformOptions().variation);
 
+/// A body off the plan, and where it is shoved as it starts.
+struct Trial {
+  Variation body;
+  double angle = 0;  // of the shove [rad] from +x towards +z
+};
+/// The corners of what bodies may differ by: heavy and soft or light and stiff, on ground that holds well or badly, from four sides.
+inline constexpr double kTrialVariation = 0.1;
+inline constexpr double kTrialShove = 0.1;  // [m/s]
+inline constexpr std::array<Trial, 4> kTrials{{{{1 + kTrialVariation, 1 - kTrialVariation, 1 - kTrialVariation}, 0},
+                                               {{1 + kTrialVariation, 1 + kTrialVariation, 1 - kTrialVariation}, std::numbers::pi / 2},
+                                               {{1 - kTrialVariation, 1 - kTrialVariation, 1 + kTrialVariation}, std::numbers::pi},
+                                               {{1 - kTrialVariation, 1 + kTrialVariation, 1 + kTrialVariation}, 3 * std::numbers::pi / 2}}};
+
 /// The scene with another body of the same shape.
 physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation);
 
@@ -80,10 +96,14 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
 /// cycle at least; of a loop that turns its drift alone counts.
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
 
-/// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, a regulator where that may be, such as looks less
-/// far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times as much. The first that does neither counts;
-/// where none does, what stays up and strays least, the earlier one unless a later strays less than half as far. On some bodies, coarse
-/// ones above all, a gain that others need shakes the feet loose.
+/// How many of kTrials fall or diverge by the options' feedback, in so long a run as theirs.
+int count_trials_lost(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
+
+/// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, where the options
+/// are thorough a regulator, such as looks less far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times
+/// as much. The first that does neither counts; where the options are thorough, the first on which all of kTrials stay up too, or else
+/// that on which most of them do. Where none keeps the body on its way, what stays up and strays least, the earlier one unless a later
+/// strays less than half as far. On some bodies, coarse ones above all, a gain that others need shakes the feet loose.
 Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's

@@ -97,7 +97,10 @@ std::vector<std::string> feedback_warnings(const Performances& performances, con
   const std::string usual = wished == Feedback() ? "the usual gain" : "its own gain";
   const std::string instead = fell ? "stays up " : is_lost ? "strays less " : "keeps it ";
   const std::string taken = "feedback: on " + usual + " the creature " + (fell ? "falls" : "loses its way") + ", it " + instead + in_words(performances.feedback);
-  return {is_lost ? taken + ", but " + way_in_words(performances.main().report) : taken};
+  if (is_lost) return {taken + ", but " + way_in_words(performances.main().report)};
+  if (performances.trials_lost == 0) return {taken};
+  return {taken + sentence("; of %d bodies %.0f %% off the plan, shoved by %.1f m/s, it loses %d", static_cast<int>(kTrials.size()),
+                           100 * kTrialVariation, kTrialShove, performances.trials_lost)};
 }
 
 }  // namespace hydrostat::retarget

@@ -58,7 +58,7 @@ TEST(Perform, RunsOnlyWhatIsWanted) {
   EXPECT_EQ(open.main().report.correction_rms, 0);
 }
 
-const std::vector<Feedback> kInTurn{{1, 1, 1, 1e-3}, {1, 1, 1, 1}, {1, 0.6, 4.0 / 3}, {1, 0.5, 10.0 / 3}, {4, 1, 1}, {16, 1, 1}, {64, 1, 1}};
+const std::vector<Feedback> kInTurn{{1, 1, 1, 1e-3}, {1, 1, 1, 1e-2}, {1, 1, 1, 1}, {1, 0.6, 4.0 / 3}, {1, 0.5, 10.0 / 3}, {4, 1, 1}, {16, 1, 1}, {64, 1, 1}};
 
 Performances perform_by(const Feedback& feedback, const Performer& performer, const SignalSet& signals, PerformOptions options) {
   options.feedback = feedback;
@@ -94,24 +94,68 @@ TEST(PerformSteadily, KeepsWhatWasWishedWhereThatWillDo) {
   }
 }
 
-/// Feedback that is too eager for how late it knows shakes the body down: the search ends at the first gain that does not.
-TEST(PerformSteadily, TakesTheFirstThatStaysUp) {
+/// Feedback that is too eager for how late it knows shakes the body down. What keeps the planned body up may still lose others: the
+/// search goes on until something keeps them all.
+TEST(PerformSteadily, TakesWhatKeepsUpThePlannedBodyAndMostOfThoseOffThePlan) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1.5);
-  options.may_regulate = true;
-  options.replay.observation.delay_s = 0.1;
+  options.is_thorough = true;
+  options.replay.observation.delay_s = 0.07;
   const auto falls_by = [&](const Feedback& feedback) { return perform_by(feedback, performer, signals, options).main().report.fell; };
+  const auto trials_lost_by = [&](const Feedback& feedback) {
+    PerformOptions by = options;
+    by.feedback = feedback;
+    return count_trials_lost(performer, signals, by);
+  };
   ASSERT_TRUE(falls_by({}));
   const Performances steady = perform_steadily(performer, signals, options);
   const auto taken = std::find(kInTurn.begin(), kInTurn.end(), steady.feedback);
   ASSERT_NE(taken, kInTurn.end());
-  EXPECT_TRUE(std::all_of(kInTurn.begin(), taken, falls_by));
   EXPECT_FALSE(steady.main().report.fell);
+  EXPECT_EQ(steady.trials_lost, trials_lost_by(*taken));
+  int refused = 0;
+  std::for_each(kInTurn.begin(), taken, [&](const Feedback& feedback) {
+    if (falls_by(feedback)) return;
+    EXPECT_GT(trials_lost_by(feedback), steady.trials_lost);
+    ++refused;
+  });
+  EXPECT_GE(refused, 1) << "the trials decided nothing";
   EXPECT_EQ(steady.wished_lapse, Lapse::kFell);
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
   EXPECT_TRUE(steady.naive && steady.open_loop);
   EXPECT_TRUE(steady.main().motion.frames == perform_by(*taken, performer, signals, options).main().motion.frames);
+}
+
+/// A level of detail has no time for trials, nor for regulators.
+TEST(PerformSteadily, TakesTheFirstGainThatStaysUpWhereItIsNotThorough) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  PerformOptions options = lasting(1.5);
+  options.replay.observation.delay_s = 0.07;
+  const auto falls_by = [&](const Feedback& feedback) { return perform_by(feedback, performer, signals, options).main().report.fell; };
+  const auto is_passed = [&](const Feedback& feedback) { return feedback.regulator > 0 || falls_by(feedback); };
+  const Performances steady = perform_steadily(performer, signals, options);
+  EXPECT_EQ(steady.wished_lapse, Lapse::kFell);
+  EXPECT_EQ(steady.lapse, Lapse::kNothing);
+  EXPECT_EQ(steady.feedback, *std::find_if_not(kInTurn.begin(), kInTurn.end(), is_passed));
+  EXPECT_EQ(steady.trials_lost, 0);
+}
+
+/// A box that nothing disturbs stands on whatever body; by feedback that knows too late none of them does.
+TEST(CountTrialsLost, IsNoneOfWhatStandsAndAllOfWhatFalls) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  PerformOptions options = lasting(1);
+  EXPECT_EQ(count_trials_lost(performer, signals, options), 0);
+  options.threads = 1;
+  options.feedback = {1, 0.5, 10.0 / 3};
+  options.replay.observation.delay_s = 0.07;
+  options.replay.duration_s = 1.5;
+  const int lost = count_trials_lost(performer, signals, options);
+  EXPECT_EQ(lost, static_cast<int>(kTrials.size()));
+  options.threads = 2;
+  EXPECT_EQ(count_trials_lost(performer, signals, options), lost);
 }
 
 /// The box as it glides over ground that hardly holds it, so far that gains differ in how far.
@@ -135,13 +179,13 @@ TEST(PerformSteadily, TakesAnotherGainWhereTheWishedOneLosesItsWay) {
   Performer performer = make_gliding_performer();
   const SignalSet signals = signals_of(performer);
   const PerformOptions options = lasting(0.6);  // three cycles, too few to tell drift
-  const Performances usual = perform_by({}, performer, signals, options), quick = perform_by(kInTurn[2], performer, signals, options);
+  const Performances usual = perform_by({}, performer, signals, options), quick = perform_by(kInTurn[3], performer, signals, options);
   const double near = usual.main().report.travel_per_cycle_length, far = quick.main().report.travel_per_cycle_length;
   ASSERT_NE(near, far);
 
   performer.clip_points.travel.x() = performer.length * way_between(far, near);
   const Performances steady = perform_steadily(performer, signals, options);
-  EXPECT_EQ(steady.feedback, kInTurn[2]);
+  EXPECT_EQ(steady.feedback, kInTurn[3]);
   EXPECT_EQ(steady.wished_lapse, Lapse::kLostWay);
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
   EXPECT_TRUE(steady.main().motion.frames == quick.main().motion.frames);

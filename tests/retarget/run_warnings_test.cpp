@@ -82,6 +82,10 @@ TEST(FeedbackWarnings, TellWhichGainWasTakenAndWhy) {
             "the clip's way and drifts 2.5 % L a cycle");
   EXPECT_EQ(told(performances_of(0.5, {}, Lapse::kFell, Lapse::kNothing), {4, 1, 1}),
             "feedback: on its own gain the creature falls, it stays up on the usual one");
+  Performances unsure = performances_of(0.5, {1, 1, 1, 1}, Lapse::kFell, Lapse::kNothing);
+  unsure.trials_lost = 2;
+  EXPECT_EQ(told(unsure), "feedback: on the usual gain the creature falls, it stays up where a regulator answers all; of 4 bodies 10 % off the plan, "
+                          "shoved by 0.1 m/s, it loses 2");
   EXPECT_EQ(told(performances_of(0.4, {}, Lapse::kLostWay, Lapse::kLostWay)),
             "feedback: the creature makes 80 % of the clip's way and drifts 2.5 % L a cycle, and strays half as far on no other gain");
 }

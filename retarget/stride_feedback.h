@@ -12,10 +12,11 @@ namespace hydrostat::retarget {
 /// The signals' swing about their means grows by the share of a stride by which the body lags, at most a tenth, smoothed
 /// over half a cycle. Where its strides come from stretching and shortening it steers too: it bends to one side while it
 /// stretches and to the other while it shortens, so that both ends, each in its turn on the way, turn to the heading that
-/// brings the body back to its path within some strides. Legs that step freely need none, what is played once has no next
-/// stride, and where there is no travel there is nothing to catch up with: then it changes nothing. Source: Laszlo, van de
-/// Panne, Fiume, "Limit Cycle Control and its Application to the Animation of Balancing and Walking", SIGGRAPH 1996, for
-/// feedback once a cycle on few parameters.
+/// brings the body back to its path within some strides; what is bent as far as it may be strides as planned, for longer
+/// strides would take the bend's effect. Legs that step freely need none, what is played once has no next stride, and where
+/// there is no travel there is nothing to catch up with: then it changes nothing. Source: Laszlo, van de Panne, Fiume, "Limit
+/// Cycle Control and its Application to the Animation of Balancing and Walking", SIGGRAPH 1996, for feedback once a cycle on
+/// few parameters.
 class StrideFeedback {
  public:
   /// length [m] is L, constraints 2 x E are the pairs of nodes. `feed_forward` as a replay's; it is sampled over one period here

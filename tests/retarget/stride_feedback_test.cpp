@@ -42,9 +42,9 @@ StrideFeedback after(const PreparedTarget& plan, const Eigen::Vector3d& off, dou
 }
 
 /// How far activations are from their mean, against before, once the body has lagged by `lag` [m]: those of the rung, which does
-/// not steer.
-double swing(const PreparedTarget& plan, const Eigen::Vector3d& lag) {
-  const StrideFeedback feedback = after(plan, -lag, 0);
+/// not steer. Turned by `yaw` [rad] meanwhile.
+double swing(const PreparedTarget& plan, const Eigen::Vector3d& lag, double yaw = 0) {
+  const StrideFeedback feedback = after(plan, -lag, yaw);
   Eigen::VectorXd activation(3);
   wave(0.3, activation);
   const double before = activation[2] - 1.02;
@@ -65,6 +65,20 @@ TEST(StrideFeedback, LengthensStridesByTheShareThatIsLostAndShortensThemWhereThe
   EXPECT_NEAR(swing(plan, {0, 0, -0.05 * kStride}), 0.95, 1e-3);
   EXPECT_NEAR(swing(plan, {0, 0, 3 * kStride}), 1.1, 1e-3);
   EXPECT_EQ(swing(plan, {0.05, 0.05, 0}), 1);
+}
+
+TEST(StrideFeedback, LengthensNoStridesOfWhatIsBentAsFarAsItMayBe) {
+  const PreparedTarget plan = travelling(kStride, ContactState::kSlide);
+  const Eigen::Vector3d lag(0, 0, kStride);
+  const double most = std::abs(after(plan, {0, 0, 0}, 1).steering());
+  for (const double side : {-1.0, 1.0}) {
+    EXPECT_NEAR(swing(plan, lag, side * 0.7 * most / 20), 1.1, 1e-3) << "there is bend to spare";
+    EXPECT_NEAR(swing(plan, lag, side * 0.9 * most / 20), 1.04, 1e-3) << "two fifths of what must be spare";
+    EXPECT_NEAR(swing(plan, lag, side * 0.2), 1, 1e-3);
+    EXPECT_NEAR(swing(plan, -lag, side * 0.2), 1, 1e-3) << "nor shortens them";
+  }
+  const PreparedTarget straight = travelling(kStride, ContactState::kSlide, true, 0.4 * kStride);
+  EXPECT_NEAR(swing(straight, lag, 0.2), 1.1, 1e-3) << "what does not steer has none to spare";
 }
 
 TEST(StrideFeedback, LeavesAloneWhatStepsFreelyStandsOrIsPlayedOnce) {

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "physics/dashpot_stages.h"
 #include "physics/impulse_contact.h"
 #include "physics/internal_forces.h"
 #include "physics/stepper.h"
@@ -8,22 +10,32 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr double kStepMargin = 0.8;    // of the linear stability bound
+constexpr double kStepMargin = 0.8;  // of the linear stability bound
+// Of a substep with the dashpots in stages, over one in which they go with the rest: by itself, and of each stage.
+constexpr double kStagedCost = 1.5;
+constexpr double kStageCost = 0.2;
+constexpr int kMostStages = 15;
+constexpr int kStiffeningPlacings = 2;  // what looking for the dashpots' stiffening once costs
 
 struct StiffestMode {
   double damping;            // [1/s]
   double frequency_squared;  // [1/s2]
+};
+struct StiffestModes {
+  StiffestMode together;  // where dashpots are braked with the rest
+  StiffestMode apart;     // the largest damping and the largest frequency of all modes
 };
 
 double longest_substep(const StiffestMode& mode) {
   return (std::sqrt(mode.damping * mode.damping + 4 * mode.frequency_squared) - mode.damping) / mode.frequency_squared;
 }
 
-/// The mode that limits the substep h of the linear motion about the rest shape: while 4 M - 2 h D - h^2 K stays positive,
+/// The modes that limit the substep h of the linear motion about the rest shape. Together: while 4 M - 2 h D - h^2 K stays positive,
 /// the roots of the amplification polynomial stay in the unit disc. The dashpots act along edges alone, the stiffest modes
-/// are those of volume: with D itself the bound is several times longer than with D = (largest damping time) K.
+/// are those of volume: with D itself the bound is several times longer than with D = (largest damping time) K. With the dashpots
+/// in stages the masses grow to M / phi, and what is left of 4 M / phi - 2 h D is nowhere less than 4 M: K alone limits h.
 template <int Dim>
-StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body, const InternalForces<Dim>& forces) {
+StiffestModes stiffest_modes_at_rest(const BodyOf<Dim>& body, const InternalForces<Dim>& forces) {
   SystemMatrixOf<Dim> stiffness(body), damping(body);
   stiffness.set_zero();
   forces.add_stiffness(body.rest, 1, stiffness);
@@ -32,19 +44,29 @@ StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body, const InternalForces
   Eigen::VectorXd root_mass(Dim * body.node_count());
   for (int i = 0; i < body.node_count(); ++i) root_mass.segment<Dim>(Dim * i).setConstant(std::sqrt(body.mass[i]));
   Eigen::VectorXd y(root_mass.size()), kz(y.size()), dz(y.size());
-  for (Eigen::Index i = 0; i < y.size(); ++i) y[i] = std::cos(1.7 * static_cast<double>(i * i % 97));
-  // Power iteration on M^-1 (2 h D + h^2 K) / 4 while h follows its largest eigenvalue toward 1, by Rayleigh's quotient.
-  StiffestMode mode{};
-  for (int k = 0; k < 300; ++k) {
-    y.normalize();
-    const Eigen::VectorXd z = y.cwiseQuotient(root_mass);
-    kz = (stiffness.lower().template selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
-    dz = (damping.lower().template selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
-    mode = {y.dot(dz), y.dot(kz)};
+  // Power iteration by Rayleigh's quotient on what `combine` makes of M^-1 K and M^-1 D.
+  const auto iterate = [&](const auto& combine) {
+    for (Eigen::Index i = 0; i < y.size(); ++i) y[i] = std::cos(1.7 * static_cast<double>(i * i % 97));
+    StiffestMode mode{};
+    for (int k = 0; k < 300; ++k) {
+      y.normalize();
+      const Eigen::VectorXd z = y.cwiseQuotient(root_mass);
+      kz = (stiffness.lower().template selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
+      dz = (damping.lower().template selfadjointView<Eigen::Lower>() * z).cwiseQuotient(root_mass);
+      mode = {y.dot(dz), y.dot(kz)};
+      combine(mode);
+    }
+    return mode;
+  };
+  // (2 h D + h^2 K) / 4, while h follows the largest eigenvalue toward 1.
+  const StiffestMode together = iterate([&](const StiffestMode& mode) {
     const double h = longest_substep(mode);
     y = 2 * h * dz + h * h * kz;
-  }
-  return mode;
+  });
+  if (together.damping == 0) return {together, together};
+  const double most_damped = iterate([&](const StiffestMode&) { y = dz; }).damping;
+  const double fastest = iterate([&](const StiffestMode&) { y = kz; }).frequency_squared;
+  return {together, {most_damped, fastest}};
 }
 
 /// Symplectic Euler (velocity Verlet with velocities at half steps) with contact by impulses.
@@ -52,6 +74,9 @@ StiffestMode stiffest_mode_at_rest(const BodyOf<Dim>& body, const InternalForces
 /// Internal forces are pairwise and taken at the positions from which the step starts, so linear and angular momentum
 /// change by the booked impulses alone, to rounding. Contact is solved on the velocity that moves the body: a point at gap g
 /// may approach with g / h at most; projected Gauss-Seidel over the points inside Coulomb's cone (Moreau's time stepping).
+/// Dashpots that would ask for much shorter substeps than the rest go in stages (DashpotStages), and contact with them: its last
+/// impulses act as forces all through the substep. As impulses alone they would stop a node and not what the dashpots tie to it,
+/// and feet would slide.
 /// Source: Hairer, Lubich, Wanner, "Geometric numerical integration", 2006, eq. (I.1.9) and, with velocities at half steps,
 /// (I.1.17); Jean, "The non-smooth contact dynamics method", CMAME 177, 1999, for contact.
 template <int Dim>
@@ -61,15 +86,17 @@ class ExplicitStepper final : public StepperOf<Dim> {
       : scene_(scene),
         forces_(scene.body, scene.threads),
         force_(Dim, scene.body.node_count()),
+        weight_(Dim, scene.body.node_count()),
         inverse_mass_(scene.body.mass.cwiseInverse()),
         contact_(scene),
         is_between_(!scene.body.elements.empty()),
         most_substeps_(most_substeps) {
-    mode_at_rest_ = stiffest_mode_at_rest(scene.body, forces_);
+    at_rest_ = stiffest_modes_at_rest(scene.body, forces_);
+    if (cost(cheapest_stages(1, 1), 1, 1) < 1 / plain_substep(1)) dashpots_.emplace(scene.body);
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
 
-  double substep(double dt) const override { return dt / std::ceil(dt / (kStepMargin * longest_substep(mode_at_rest_))); }
+  double substep(double dt) const override { return dt / std::ceil(dt / longest_substep(1, 1)); }
 
   StepWork work() const override {
     StepWork work = work_;
@@ -84,26 +111,37 @@ class ExplicitStepper final : public StepperOf<Dim> {
     if (!forces_.set_activation(activation)) return Termination::kDiverged;
     start_ = state;
     // The bound at rest, shortened by as much as the shape from which the step starts is stiffer.
-    StiffestMode mode = mode_at_rest_;
-    mode.frequency_squared *= forces_.stiffening(state.x);
-    const double count = std::ceil(dt / (kStepMargin * longest_substep(mode)));
+    const double stiffer = forces_.stiffening(state.x), more_damped = dashpots_ ? dashpots_->stiffening(state.x) : 1;
+    const double count = std::ceil(dt / longest_substep(stiffer, more_damped));
     if (!(count <= most_substeps_)) return Termination::kDiverged;
     const int substeps = static_cast<int>(count);
     work_.passes += substeps;
     work_.rounds += substeps;
     const double h = dt / substeps;
+    const int stages = dashpots_ ? stages_for(h, more_damped) : 0;
+    if (dashpots_) {
+      work_.stages += substeps * stages;
+      work_.placings += substeps + kStiffeningPlacings;
+    }
+    weight_ = scene_.gravity * scene_.body.mass.transpose();
     clear(impulses);
     contact_.forget_reach();
     begin_between(h, state, impulses);
     for (int s = 0; s < substeps; ++s) {
       force_.setZero();
-      forces_.add_forces(state, force_);
+      dashpots_ ? forces_.add_elastic_forces(state.x, force_) : forces_.add_forces(state, force_);
       if (effect_force != nullptr) {
         force_ += *effect_force;
         impulses.effect_nodes += h * *effect_force;
         for (int i = 0; i < scene_.body.node_count(); ++i) {
           impulses.effect_moment += h * cross<Dim>(state.x.col(i), effect_force->col(i));
         }
+      }
+      if (dashpots_) {
+        if (contact_.is_needed()) contact_.add_last_forces(h, state, force_, impulses);
+        force_ += weight_;  // which the dashpots of held nodes brake
+        dashpots_->add_mean_forces(state.x, state.v, h, stages, force_);
+        force_ -= weight_;
       }
       hold(h, state, impulses);
       double fastest = 0;
@@ -130,6 +168,37 @@ class ExplicitStepper final : public StepperOf<Dim> {
   }
 
  private:
+  // Substeps [s] with a margin, where the body is so many times stiffer and its dashpots so many times as strong as at rest.
+  double plain_substep(double stiffer) const {
+    return kStepMargin * hydrostat::physics::longest_substep({at_rest_.together.damping, stiffer * at_rest_.together.frequency_squared});
+  }
+  double staged_substep(int stages, double stiffer, double more_damped) const {
+    const StiffestMode& mode = at_rest_.apart;
+    return kStepMargin * std::min(2 / std::sqrt(stiffer * mode.frequency_squared),
+                                  DashpotStages<Dim>::reach(stages) / (more_damped * mode.damping));
+  }
+  double longest_substep(double stiffer, double more_damped) const {
+    return dashpots_ ? staged_substep(cheapest_stages(stiffer, more_damped), stiffer, more_damped) : plain_substep(stiffer);
+  }
+
+  /// Of a simulated second, in plain substeps.
+  double cost(int stages, double stiffer, double more_damped) const {
+    return (kStagedCost + kStageCost * stages) / staged_substep(stages, stiffer, more_damped);
+  }
+  int cheapest_stages(double stiffer, double more_damped) const {
+    int best = 3;
+    for (int stages = 5; stages <= kMostStages; stages += 2) {
+      if (cost(stages, stiffer, more_damped) < cost(best, stiffer, more_damped)) best = stages;
+    }
+    return best;
+  }
+  /// As few as a substep of h [s] asks for.
+  int stages_for(double h, double more_damped) const {
+    int stages = 3;
+    while (stages < kMostStages && kStepMargin * DashpotStages<Dim>::reach(stages) < h * more_damped * at_rest_.apart.damping) stages += 2;
+    return stages;
+  }
+
   /// Takes the places half a substep on, where the velocities that come in and go out are those of the whole step: an error of
   /// second order instead of first, at no cost. Bodies of springs and volumes alone keep the motion that they always had.
   void begin_between(double h, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
@@ -154,13 +223,15 @@ class ExplicitStepper final : public StepperOf<Dim> {
 
   const SceneOf<Dim>& scene_;
   InternalForces<Dim> forces_;
-  PointsOf<Dim> force_;  // [N]
+  PointsOf<Dim> force_;         // [N]
+  PointsOf<Dim> weight_;        // [N]
   Eigen::VectorXd inverse_mass_;
   ImpulseContact<Dim> contact_;
+  std::optional<DashpotStages<Dim>> dashpots_;  // where they go in stages
   bool is_between_;  // substeps take their forces between the places that the steps tell
   double most_substeps_;
   StateOf<Dim> start_;
-  StiffestMode mode_at_rest_{};  // of the body at rest
+  StiffestModes at_rest_{};
   double shortest_edge_ = 0;     // [m]
   StepWork work_;
 };

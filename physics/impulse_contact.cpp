@@ -9,12 +9,13 @@ namespace {
 constexpr double kReach = 0.1;  // of the shortest edge [-]: places as near as that are watched
 constexpr int kSweeps = 30;
 constexpr double kTolerance = 1e-7;  // [m/s] change of a place's velocity in a sweep
+constexpr double kOvershoot = 0.8;   // of what the last forces lacked: it is that of one node, which drags others along
 
 }  // namespace
 
 template <int Dim>
 ImpulseContact<Dim>::ImpulseContact(const SceneOf<Dim>& scene)
-    : set_(scene), inverse_mass_(inverse_masses(scene.body)), impulse_(PointsOf<Dim>::Zero(Dim, set_.slot_count())) {
+    : set_(scene), inverse_mass_(inverse_masses(scene.body)), impulse_(PointsOf<Dim>::Zero(Dim, set_.slot_count())), given_(impulse_) {
   shortest_edge_ = scene.body.rest_length.minCoeff();
   push_out_speed_ = push_out_speed(scene);
   active_.reserve(static_cast<std::size_t>(set_.slot_count()));
@@ -37,7 +38,9 @@ void ImpulseContact<Dim>::find_candidates(double farther, const StateOf<Dim>& st
   std::fill(is_candidate_.begin(), is_candidate_.end(), 0);
   for (const ContactOf<Dim>& contact : set_.candidates()) is_candidate_[static_cast<std::size_t>(contact.slot)] = 1;
   for (std::size_t s = 0; s < is_candidate_.size(); ++s) {
-    if (!is_candidate_[s]) impulse_.col(static_cast<Eigen::Index>(s)).setZero();
+    if (is_candidate_[s]) continue;
+    impulse_.col(static_cast<Eigen::Index>(s)).setZero();
+    given_.col(static_cast<Eigen::Index>(s)).setZero();
   }
 }
 
@@ -63,7 +66,7 @@ void ImpulseContact<Dim>::gather_active(double h, StateOf<Dim>& state) {
     const VectorOf<Dim> velocity = contact.of(state.v) - set_.velocity(contact);
     if (contact.gap + h * contact.normal.dot(velocity) < 0 || impulse_.col(contact.slot).squaredNorm() > 0) {
       active_.push_back({static_cast<int>(c), std::min(-contact.gap / h, push_out_speed_)});
-      apply(contact, impulse_.col(contact.slot), state);  // warm start
+      if (!has_given_) apply(contact, impulse_.col(contact.slot), state);  // warm start
     }
   }
 }
@@ -86,11 +89,40 @@ double ImpulseContact<Dim>::sweep(StateOf<Dim>& state) {
   return change;
 }
 
+/// What the contact's last forces lacked was measured on places that the dashpots tied to others within the substep: the whole
+/// that is lacking is up to 1 / phi times as much (DashpotStages). As phi is 1 at most, forces that each time add less than twice
+/// what was measured come to an end.
+template <int Dim>
+void ImpulseContact<Dim>::add_last_forces(double h, const StateOf<Dim>& state, PointsOf<Dim>& force, ImpulsesOf<Dim>& impulses) {
+  has_given_ = true;
+  for (ContactOf<Dim>& contact : set_.candidates()) {
+    const VectorOf<Dim> given = given_.col(contact.slot);
+    given_.col(contact.slot).setZero();
+    if (impulse_.col(contact.slot).squaredNorm() == 0) continue;
+    set_.update(state.x, state.obstacle_travel, contact);
+    if (!std::isfinite(contact.gap) || contact.inverse_mass == 0) {
+      impulse_.col(contact.slot).setZero();
+      continue;
+    }
+    const VectorOf<Dim> sought = (h / last_h_) * (impulse_.col(contact.slot) + kOvershoot * (impulse_.col(contact.slot) - given));
+    const VectorOf<Dim> next = impulse_in_cone<Dim>(contact, VectorOf<Dim>::Zero(), 0, set_.friction(contact), sought);
+    impulse_.col(contact.slot) = next;
+    given_.col(contact.slot) = next;
+    for (int k = 0; k < contact.node_count; ++k) {
+      const auto n = static_cast<std::size_t>(k);
+      if (inverse_mass_[contact.nodes[n]] > 0) force.col(contact.nodes[n]) += (contact.weights[n] / h) * next;
+    }
+    book(contact, next, state, impulses);
+    impulses.obstacle_work += next.dot(set_.velocity(contact));
+  }
+}
+
 template <int Dim>
 void ImpulseContact<Dim>::push_apart(double h, double fastest, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
   // What contact itself may add to a node's speed is within twice the fastest.
   const double farthest = 2 * h * fastest + h * (push_out_speed_ + set_.fastest_obstacle());
   reach_ -= farthest;
+  last_h_ = h;
   if (reach_ < 0) find_candidates(farthest, state);
   if (set_.candidates().empty()) {
     active_.clear();
@@ -109,20 +141,28 @@ template <int Dim>
 void ImpulseContact<Dim>::book(const StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const {
   for (const Active& active : active_) {
     const ContactOf<Dim>& contact = set_.candidates()[static_cast<std::size_t>(active.candidate)];
-    const VectorOf<Dim> impulse = impulse_.col(contact.slot);
-    impulses.obstacle_work += impulse.dot(set_.velocity(contact) + std::max(0.0, active.least_velocity) * contact.normal);
-    PointsOf<Dim>& of_nodes = contact.is_internal() ? impulses.internal_nodes : impulses.contact_nodes;
-    for (int k = 0; k < contact.node_count; ++k) {
-      const auto n = static_cast<std::size_t>(k);
-      of_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
-    }
-    if (contact.is_internal()) continue;
-    for (int k = 0; k < contact.point_count; ++k) {
-      const auto n = static_cast<std::size_t>(k);
-      impulses.contact.col(contact.points[n]) += contact.shares[n] * impulse;
-    }
-    impulses.contact_moment += cross<Dim>(contact.of(state.x), impulse);
+    VectorOf<Dim> impulse = impulse_.col(contact.slot);
+    impulses.obstacle_work += impulse.dot(std::max(0.0, active.least_velocity) * contact.normal);
+    if (has_given_) impulse -= given_.col(contact.slot);
+    impulses.obstacle_work += impulse.dot(set_.velocity(contact));
+    book(contact, impulse, state, impulses);
   }
+}
+
+template <int Dim>
+void ImpulseContact<Dim>::book(const ContactOf<Dim>& contact, const VectorOf<Dim>& impulse, const StateOf<Dim>& state,
+                               ImpulsesOf<Dim>& impulses) const {
+  PointsOf<Dim>& of_nodes = contact.is_internal() ? impulses.internal_nodes : impulses.contact_nodes;
+  for (int k = 0; k < contact.node_count; ++k) {
+    const auto n = static_cast<std::size_t>(k);
+    of_nodes.col(contact.nodes[n]) += contact.weights[n] * impulse;
+  }
+  if (contact.is_internal()) return;
+  for (int k = 0; k < contact.point_count; ++k) {
+    const auto n = static_cast<std::size_t>(k);
+    impulses.contact.col(contact.points[n]) += contact.shares[n] * impulse;
+  }
+  impulses.contact_moment += cross<Dim>(contact.of(state.x), impulse);
 }
 
 template class ImpulseContact<2>;

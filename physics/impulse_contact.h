@@ -19,7 +19,14 @@ class ImpulseContact {
   /// To be called when the state is not the one that the last substep left behind.
   void forget_reach() { reach_ = 0; }
   /// To be called when that state may have nothing to do with this one.
-  void forget() { set_.forget(); }
+  void forget() {
+    set_.forget();
+    impulse_.setZero();
+    given_.setZero();
+  }
+  /// Adds forces that go on all through this substep, learned from the last one's impulses [N], and books them: push_apart then
+  /// does and books what these lack or have too much.
+  void add_last_forces(double h, const StateOf<Dim>& state, PointsOf<Dim>& force, ImpulsesOf<Dim>& impulses);
   /// Changes state.v so that state.x may move on by h state.v, books the impulses and moves the obstacles on.
   /// `fastest` [m/s]: no node is faster before contact.
   void push_apart(double h, double fastest, StateOf<Dim>& state, ImpulsesOf<Dim>& impulses);
@@ -34,10 +41,14 @@ class ImpulseContact {
   void apply(const ContactOf<Dim>& contact, const VectorOf<Dim>& impulse, StateOf<Dim>& state) const;
   double sweep(StateOf<Dim>& state);
   void book(const StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const;
+  void book(const ContactOf<Dim>& contact, const VectorOf<Dim>& impulse, const StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) const;
 
   ContactSet<Dim> set_;
   Eigen::VectorXd inverse_mass_;
   PointsOf<Dim> impulse_;     // [N s] Dim x slots, of the last substep
+  PointsOf<Dim> given_;       // [N s] Dim x slots: what of it came as a force
+  bool has_given_ = false;
+  double last_h_ = 0;         // [s]
   double shortest_edge_ = 0;  // [m]
   double push_out_speed_ = 0;
   double reach_ = 0;  // [m] that the body may still move before places beyond the candidates can touch

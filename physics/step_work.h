@@ -24,6 +24,8 @@ struct ContactWork {
 /// retarget/step_cost.h.
 struct StepWork {
   double passes = 0;      // over the whole body, for its forces or its energy
+  double stages = 0;      // of dashpots by themselves: passes over these alone
+  double placings = 0;    // of the dashpots for such stages
   double sweeps = 0;      // over all of xpbd's constraints
   double assemblies = 0;  // of the system matrix
   double products = 0;    // of its blocks (Dim x Dim), to factor it and to solve with it
@@ -32,6 +34,8 @@ struct StepWork {
 
   StepWork& operator+=(const StepWork& other) {
     passes += other.passes;
+    stages += other.stages;
+    placings += other.placings;
     sweeps += other.sweeps;
     assemblies += other.assemblies;
     products += other.products;

@@ -6,6 +6,7 @@
 
 #include "physics/elastic_forces.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/damping_seconds.h"
 #include "retarget/performed_scenario.h"
 #include "retarget/picture_effects.h"
 #include "retarget/simulation.h"
@@ -101,7 +102,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
   const double elastic = has_elements ? 0 : seconds_of([&] { physics::add_elastic_forces(body, state.x, passive, force); });
   const double edges_alone =
       has_elements ? 0 : seconds_of([&] { physics::add_elastic_forces(springs, state.x, passive, force); });
-  const double damping = seconds_of([&] { physics::add_damping_forces(body, state.x, state.v, force); });
+  const double damping = damping_seconds(performer.scene, options.method, options.step_s, state);
   const double gravity = seconds_of([&] { force.colwise() += performer.scene.gravity; });
   const bool pushed = !options.pushes.empty(), touches_itself = performer.scene.self_contact.is_on;
   const double pushing = pushed ? seconds_of([&] { force += state.v; }) : 0;
@@ -119,7 +120,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
        has_elements ? "a part of the elements' law, as far as Poisson's ratio says; counted there"
                     : "the body keeps the volume of each tet by a spring",
        ms(std::max(0.0, elastic - edges_alone) * passes)},
-      {"damping", "on", "a dashpot along every constraint; timed as a pass over the constraints of its own",
+      {"damping", "on", "a dashpot along every constraint; timed by themselves",
        ms(damping * passes)},
       {"air_drag", "off", "a creature moves in still air without drag; scenes have [air]", 0},
       {"water", "off", "there is no water", 0},

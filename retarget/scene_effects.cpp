@@ -5,6 +5,7 @@
 #include "physics/fluid.h"
 #include "physics/tearing.h"
 #include "retarget/cpu_seconds.h"
+#include "retarget/damping_seconds.h"
 #include "retarget/simulation.h"
 
 namespace hydrostat::retarget {
@@ -131,8 +132,8 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
                      1000 * itself});
   tell("volume", has_volume_springs || !body.elements.empty(), "nothing keeps volume", "",
        has_volume_springs ? ms_of_volume(body, state, passive, ms_of) : 0);
-  tell("damping", has_damping, "damping_time_s is 0", "timed as a pass over the constraints of its own",
-       has_damping ? ms_of([&] { physics::add_damping_forces(body, state.x, state.v, force); }) : 0);
+  tell("damping", has_damping, "damping_time_s is 0", "timed by themselves",
+       has_damping ? 1000 * passes * damping_seconds(scene, options.method, options.dt_s, state) : 0);
   tell("air_drag", scene.air.has_value(), "the scene tells of no air", "one pass over the surface a step", cost_of_fluid(scene.air));
   tell("water", scene.water.has_value(), "there is no water", "buoyancy and drag, one pass over the surface a step",
        cost_of_fluid(scene.water));

@@ -16,7 +16,7 @@ constexpr StepCosts kCosts[2][5] = {
         {{.one = 380, .volumes = 12, .simplices = 22, .boxes = 40, .active_simplices = 160, .active_boxes = 190, .wet = 36},
          {.one = 19, .nodes = 8.5, .edges = 2.2, .dashpots = 1.4, .volumes = 1.1, .simplices = 3.6, .corotated = 4.4,
           .boxes = 9.3, .active_simplices = 10, .active_boxes = 9.4},
-         {.edges = 47, .volumes = 43, .simplices = 380, .boxes = 690}, 2.9},  // explicit
+         {.edges = 47, .volumes = 43, .simplices = 380, .boxes = 690}, 2.9, 4.2, 11},  // explicit
         {{.one = 700, .springs = 8.2, .dashpots = 3.2, .active_simplices = 83, .active_boxes = 87, .wet = 71},
          {.edges = 4.3, .dashpots = 1.3, .volumes = 7.1, .simplices = 8.9, .corotated = 0.65, .boxes = 12,
           .active_simplices = 7.6, .active_boxes = 8},
@@ -37,7 +37,7 @@ constexpr StepCosts kCosts[2][5] = {
         {{.one = 350, .edges = 8.4, .volumes = 19, .simplices = 36, .active_simplices = 210, .active_boxes = 450, .wet = 100},
          {.one = 150, .edges = 7.6, .dashpots = 2.5, .volumes = 4.2, .simplices = 4.9, .corotated = 18, .active_simplices = 9.7,
           .active_boxes = 27},
-         {.one = 1400, .springs = 49, .volumes = 130, .simplices = 2100, .boxes = 7800}, 6.8},  // explicit
+         {.one = 1400, .springs = 49, .volumes = 130, .simplices = 2100, .boxes = 7800}, 6.8, 3.7, 12},  // explicit
         {{.one = 750, .dashpots = 1.4, .volumes = 40, .corotated = 19, .boxes = 240, .active_simplices = 110,
           .active_boxes = 530, .wet = 110},
          {.one = 190, .edges = 2.9, .springs = 2.2, .dashpots = 2.8, .volumes = 14, .simplices = 14, .corotated = 12,
@@ -117,6 +117,7 @@ double counted_ms(const physics::SceneOf<Dim>& scene, physics::Method method, bo
   const StepCosts& costs = costs_of<Dim>(method);
   return 1e-6 * (steps * worth(costs.step, counts) + (work.passes + work.sweeps) * worth(costs.pass, counts) +
                  work.assemblies * worth(costs.assembly, counts) + work.products * costs.product +
+                 counts.dashpots * (work.stages * costs.stage + work.placings * costs.placing) +
                  worth(kContact[Dim - 2], work.by_impulses, work.by_potential));
 }
 template double counted_ms<2>(const physics::SceneOf<2>&, physics::Method, bool, double, const physics::StepWork&);

@@ -24,10 +24,10 @@ template <int Dim>
 StepParts parts_of(const physics::SceneOf<Dim>& scene, bool is_active);
 
 /// [ns] of a method: of an outer step, a pass over the body (a sweep over its constraints) and an assembled matrix, of each their parts; of a
-/// product of two blocks.
+/// product of two blocks; of a dashpot in a stage and in being placed for stages.
 struct StepCosts {
   StepParts step, pass, assembly;
-  double product = 0;
+  double product = 0, stage = 0, placing = 0;
 };
 
 /// [ns] of contact, as physics/step_work.h has it, by impulses and by a potential.

@@ -9,22 +9,34 @@ namespace {
 constexpr double kMostSubsteps = 2000;  // as make_explicit_stepper has it
 constexpr double kSpare = 0.7;          // of the damping time that would just do at rest: bodies stiffen when they deform
 
+constexpr double kExactness = 1.05;     // of the share that is sought
+constexpr double kLeastShare = 1e-6;
+
 template <int Dim>
 double substep_with(physics::SceneOf<Dim> scene, double damping_share, double dt) {
   scene.body.edge_damping *= damping_share;
   return physics::make_explicit_stepper(scene)->substep(dt);
 }
 
+/// The largest share of the damping with which a step takes no more than what is wanted, 0 where none does.
+template <int Dim>
+double largest_share(const physics::SceneOf<Dim>& scene, double wanted, double dt) {
+  if (substep_with<Dim>(scene, 0, dt) < wanted) return 0;
+  double low = kLeastShare, high = 1;
+  while (high > kExactness * low) {
+    const double middle = std::sqrt(low * high);
+    (substep_with<Dim>(scene, middle, dt) < wanted ? high : low) = middle;
+  }
+  return low;
+}
+
 }  // namespace
 
-/// The bound h on a substep obeys 4 - 2 h d - h^2 k = 0 (physics/explicit.cpp), d growing with the damping time: two of them tell
-/// d and k.
 template <int Dim>
 std::string explicit_step_warning(const physics::SceneOf<Dim>& scene, double dt, double damping_time) {
   const double h = substep_with<Dim>(scene, 1, dt), wanted = dt / kMostSubsteps;
   if (h >= wanted) return {};
-  const double undamped = substep_with<Dim>(scene, 0, dt), k = 4 / (undamped * undamped), d = (4 - h * h * k) / (2 * h);
-  const double share = (4 - wanted * wanted * k) / (2 * wanted * d);
+  const double share = largest_share<Dim>(scene, wanted, dt);
   char text[320];
   const int count = std::snprintf(text, sizeof text,
                                   "method 'explicit' would want %.0f substeps of a step, where it may take %.0f: its guard 'euler' takes "

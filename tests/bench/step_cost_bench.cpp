@@ -126,7 +126,7 @@ void take(Run& run) {
 void write_csv(const std::vector<Run>& runs, const fs::path& file) {
   std::ofstream csv(file);
   csv << "kind,surroundings,active,youngs_modulus_pa,damping_s,method,dt_s,nodes,edges,springs,dashpots,volumes,elements,places,steps,passes,"
-         "sweeps,assemblies,products,rounds,searched,own_searched,looks,wide_looks,pushes,plain,counted_ms,ms\n";
+         "stages,placings,sweeps,assemblies,products,rounds,searched,own_searched,looks,wide_looks,pushes,plain,counted_ms,ms\n";
   for (const Run& run : runs) {
     const auto write = [&](const auto& scenario) {
       const auto& body = scenario.scene.body;
@@ -139,7 +139,7 @@ void write_csv(const std::vector<Run>& runs, const fs::path& file) {
           << physics::name_of(run.method) << ','
           << run.dt_s << ',' << body.node_count() << ',' << body.edge_count() << ',' << (body.edge_stiffness.array() > 0).count() << ','
           << (body.edge_damping.array() > 0).count() << ',' << body.volume_stiffness.size() << ',' << elements << ','
-          << scenario.scene.contact_points.count() << ',' << run.steps << ',' << run.work.passes << ',' << run.work.sweeps << ',' << run.work.assemblies << ','
+          << scenario.scene.contact_points.count() << ',' << run.steps << ',' << run.work.passes << ',' << run.work.stages << ',' << run.work.placings << ',' << run.work.sweeps << ',' << run.work.assemblies << ','
           << run.work.products << ',' << run.work.rounds << ',' << contact.searched << ',' << contact.own_searched << ',' << contact.looks << ','
           << contact.wide_looks << ',' << contact.pushes << ',' << run.is_plain << ',' << run.counted_ms << ',' << run.least_ms << '\n';
     };
@@ -178,8 +178,8 @@ constexpr std::array<Part, 12> kParts{{{"one", &StepParts::one}, {"nodes", &Step
                                        {"active_simplices", &StepParts::active_simplices}, {"active_boxes", &StepParts::active_boxes},
                                        {"wet", &StepParts::wet}}};
 constexpr Eigen::Index kPartCount = kParts.size();
-/// Where each of them stands in a vector of a method's costs: of steps, passes and assemblies, and that of products.
-enum : Eigen::Index { kStep = 0, kPass = kPartCount, kAssembly = 2 * kPartCount, kProduct = 3 * kPartCount, kCostCount };
+/// Where each of them stands in a vector of a method's costs: of steps, passes and assemblies, and those of products, stages and placings.
+enum : Eigen::Index { kStep = 0, kPass = kPartCount, kAssembly = 2 * kPartCount, kProduct = 3 * kPartCount, kStage, kPlacing, kCostCount };
 
 /// How often a run paid each cost.
 Eigen::VectorXd counts_of(const Run& run) {
@@ -193,6 +193,8 @@ Eigen::VectorXd counts_of(const Run& run) {
     counts[kAssembly + p] = run.work.assemblies * of_part;
   }
   counts[kProduct] = run.work.products;
+  counts[kStage] = run.work.stages * parts.dashpots;
+  counts[kPlacing] = run.work.placings * parts.dashpots;
   return counts;
 }
 
@@ -212,6 +214,7 @@ Eigen::Vector<double, kContactCount> contact_counts_of(const Run& run) {
 /// Whether a method pays for a cost at all.
 bool is_paid(physics::Method method, Eigen::Index cost) {
   if (cost == kProduct) return true;
+  if (cost > kProduct) return method == physics::Method::kExplicit;
   const double StepParts::*part = kParts[static_cast<std::size_t>(cost % kPartCount)].value;
   const bool is_active = part == &StepParts::active_simplices || part == &StepParts::active_boxes;
   const bool is_of_elements = is_active || part == &StepParts::volumes || part == &StepParts::simplices ||
@@ -235,7 +238,7 @@ Fit fitted(const std::vector<const Run*>& runs) {
   const Eigen::Index contact = std::size(physics::kMethods) * kCostCount;
   const auto column = [](physics::Method method, Eigen::Index cost) {
     if (method == physics::Method::kEuler && cost >= kPass && cost < kAssembly) method = physics::Method::kImplicit;
-    if (method == physics::Method::kExplicit && cost >= kAssembly) method = physics::Method::kEuler;
+    if (method == physics::Method::kExplicit && cost >= kAssembly && cost <= kProduct) method = physics::Method::kEuler;
     return static_cast<Eigen::Index>(method) * kCostCount + cost;
   };
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(runs.size()), contact + kContactCount);
@@ -286,7 +289,9 @@ void write_costs(const Eigen::VectorXd& costs, physics::Method method, std::ofst
     }
     out << '}';
   }
-  out << ", " << number(costs[kProduct]) << "},  // " << physics::name_of(method) << '\n';
+  out << ", " << number(costs[kProduct]);
+  if (method == physics::Method::kExplicit) out << ", " << number(costs[kStage]) << ", " << number(costs[kPlacing]);
+  out << "},  // " << physics::name_of(method) << '\n';
 }
 
 void write_fit(const std::vector<Run>& runs, double slower, const fs::path& file) {

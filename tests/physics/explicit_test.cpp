@@ -88,13 +88,18 @@ TYPED_TEST(Explicit, StaysStableUnderSuddenActivationOfFortyPercentAndOfTwentyWi
   }
 }
 
+template <int Dim>
+Material damped_by(double damping_time) {
+  Material material;
+  material.damping_time = damping_time;
+  return material;
+}
+
 TYPED_TEST(Explicit, TakesMostOfTheLinearStabilityBound) {
   constexpr int Dim = TypeParam::kDim;
-  for (const double damping_time : {0.0, 0.002, 0.01}) {
+  for (const double damping_time : {0.0, 0.001, 0.002}) {
     SCOPED_TRACE("damping " + std::to_string(damping_time) + " s");
-    Material material;
-    material.damping_time = damping_time;
-    const SceneOf<Dim> scene = in_the_air(bar<Dim>(2, 2, 2, 0.1, material), false);
+    const SceneOf<Dim> scene = in_the_air(bar<Dim>(2, 2, 2, 0.1, damped_by<Dim>(damping_time)), false);
     const BodyOf<Dim>& body = scene.body;
     SystemMatrixOf<Dim> matrix(body);
     const double h = make_explicit_stepper(scene)->substep(1);
@@ -108,6 +113,46 @@ TYPED_TEST(Explicit, TakesMostOfTheLinearStabilityBound) {
     };
     EXPECT_TRUE(is_stable(1.2 * h));
     EXPECT_FALSE(is_stable(1.27 * h));
+  }
+}
+
+TYPED_TEST(Explicit, KeepsTheSubstepOfTheElasticForcesWhereDashpotsWouldWantAMuchShorterOne) {
+  constexpr int Dim = TypeParam::kDim;
+  const auto substep_of = [](double damping_time) {
+    return make_explicit_stepper(in_the_air(bar<Dim>(4, 2, 2, 0.1, damped_by<Dim>(damping_time)), false))->substep(1);
+  };
+  const double undamped = substep_of(0);
+  for (const double damping_time : {0.01, 0.03, 0.1}) {
+    SCOPED_TRACE("damping " + std::to_string(damping_time) + " s");
+    const double h = substep_of(damping_time);
+    EXPECT_LE(h, 1.001 * undamped);
+    EXPECT_GT(h, 0.6 * undamped);
+  }
+}
+
+/// All of the body moves sideways, feet too, which the ground stops or brakes.
+TYPED_TEST(Explicit, HoldsWhatDashpotsTieToAFootAsMuchShorterSubstepsDo) {
+  constexpr int Dim = TypeParam::kDim;
+  for (const double friction : {0.2, 0.8, 2.0}) {
+    SCOPED_TRACE("friction " + std::to_string(friction));
+    const BodyOf<Dim> body = four_legged<Dim>(damped_by<Dim>(0.02));
+    SceneOf<Dim> scene = scene_of(body, soles(body), slope<Dim>(0, friction));
+    const auto path = [&](double share) {
+      const std::unique_ptr<StepperOf<Dim>> stepper = make_explicit_stepper(scene);
+      const double h = stepper->substep(kDt) * share;
+      ImpulsesOf<Dim> impulses = make_impulses(scene);
+      StateOf<Dim> state = laid_down(scene);
+      state.v.row(0).setConstant(1);
+      for (int k = 0; k < std::lround(0.1 / h); ++k) {
+        EXPECT_EQ(stepper->step(h, passive(body), nullptr, state, impulses), Termination::kDone);
+      }
+      return state.x;
+    };
+    const PointsOf<Dim> truth = path(1.0 / 32), start = laid_down(scene).x;
+    const auto error = [&](double share) { return (path(share) - truth).norm() / (truth - start).norm(); };
+    const double whole = error(1);
+    EXPECT_LT(whole, friction < 1 ? 0.01 : 0.05);
+    EXPECT_LT(error(0.25), 0.4 * whole);
   }
 }
 

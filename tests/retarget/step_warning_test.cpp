@@ -19,12 +19,12 @@ physics::Scene bar_of(double length, double damping_time) {
 
 TEST(ExplicitStepWarning, IsNoneWhereTheStepsAreTaken) {
   EXPECT_EQ(explicit_step_warning<3>(bar_of(1, 0.01), kDt, 0.01), "");
-  EXPECT_EQ(explicit_step_warning<3>(bar_of(0.001, 1e-5), kDt, 1e-5), "");
+  EXPECT_EQ(explicit_step_warning<3>(bar_of(0.001, 0.01), kDt, 0.01), "");
 }
 
 TEST(ExplicitStepWarning, NamesADampingTimeThatDoes) {
-  for (const double length : {1e-3, 3e-4}) {
-    for (const double damping_time : {0.01, 0.3}) {
+  for (const double length : {1e-4, 3e-5}) {
+    for (const double damping_time : {0.1, 3.0}) {
       SCOPED_TRACE(std::to_string(length) + " m, " + std::to_string(damping_time) + " s");
       const std::string warning = explicit_step_warning<3>(bar_of(length, damping_time), kDt, damping_time);
       const std::size_t at = warning.find("damping_time_s = ");

@@ -83,7 +83,7 @@ void DashpotStages<Dim>::set_stages(int stages) {
   stages_.clear();
   const auto weight = [](int j) { return j < 2 ? 1.0 / 3 : (j * j + j - 2.0) / (2.0 * j * (j + 1)); };
   const double scale = 2 / reach(stages);
-  const auto time = [&](int j) { return (j == 1 ? 0.25 * reach(2) : reach(j)) / reach(stages); };
+  const auto time = [&](int j) { return (j == 1 ? reach(2) / 3 : reach(j)) / reach(stages); };
   stages_.push_back({0, 0, 0, weight(1) * scale, 0});
   for (int j = 2; j <= stages; ++j) {
     const double last = (2.0 * j - 1) / j * weight(j) / weight(j - 1), before = -(j - 1.0) / j * weight(j) / weight(j - 2);
@@ -92,9 +92,9 @@ void DashpotStages<Dim>::set_stages(int stages) {
 }
 
 /// From places in the nodes' velocities. An edge that turns comes to lie so that |across|^2 / l more of its ends' velocity a second is
-/// along it.
+/// along it; until half a substep from now never more than the whole.
 template <int Dim>
-void DashpotStages<Dim>::set_edges() {
+void DashpotStages<Dim>::set_edges(double h) {
   const Node* const nodes = nodes_.data();
   const Course* const courses = courses_.data();
   for (std::size_t e = 0; e < edges_.size(); e += Lanes::kCount) {
@@ -107,7 +107,8 @@ void DashpotStages<Dim>::set_edges() {
     }
     const Lanes squared = products(span, span), along = products(span, rate);
     Lanes root = sqrt(Lanes(Lanes::Vector{damping[0], damping[1], damping[2], damping[3]}) / squared);
-    const Lanes turning = where_positive(squared, root * (products(rate, rate) - along * along / squared), Lanes(0.0));
+    const Lanes across = products(rate, rate) - along * along / squared;
+    const Lanes turning = where_positive(squared, root * across / sqrt(1.0 + (0.25 * h * h) * across / squared), Lanes(0.0));
     root = where_positive(squared, root, Lanes(0.0));  // without a length no direction
     for (int k = 0; k < Lanes::kCount; ++k) {
       along_[e + static_cast<std::size_t>(k)] = Lanes(root[k]) * span[k];
@@ -131,7 +132,7 @@ void DashpotStages<Dim>::add_forces(double time) {
 /// In momentum that comes in, so that what all nodes get sums to the constant forces' impulse in every stage.
 template <int Dim>
 void DashpotStages<Dim>::integrate(double h) {
-  set_edges();
+  set_edges(h);
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     nodes_[i] = {courses_[i].start, courses_[i].constant};
     courses_[i].impulse = courses_[i].last_impulse = Lanes(0.0);

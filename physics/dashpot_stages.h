@@ -56,7 +56,7 @@ class DashpotStages {
   void integrate(double h);
   void integrate_here(double h);
   void integrate_wide(double h);
-  void set_edges();
+  void set_edges(double h);
   void add_forces(double time);
 
   const BodyOf<Dim>& body_;

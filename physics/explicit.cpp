@@ -22,12 +22,12 @@ struct StiffestMode {
   double frequency_squared;  // [1/s2]
 };
 struct StiffestModes {
-  StiffestMode together;  // where dashpots are braked with the rest
+  StiffestMode together;  // where dashpots go with the rest
   StiffestMode apart;     // the largest damping and the largest frequency of all modes
 };
 
 double longest_substep(const StiffestMode& mode) {
-  return (std::sqrt(mode.damping * mode.damping + 4 * mode.frequency_squared) - mode.damping) / mode.frequency_squared;
+  return 4 / (std::sqrt(mode.damping * mode.damping + 4 * mode.frequency_squared) + mode.damping);
 }
 
 /// The modes that limit the substep h of the linear motion about the rest shape. Together: while 4 M - 2 h D - h^2 K stays positive,
@@ -122,8 +122,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
     if (dashpots_) {
       work_.stages += substeps * stages;
       work_.placings += substeps + kStiffeningPlacings;
+      weight_.noalias() = scene_.gravity * scene_.body.mass.transpose();
     }
-    weight_ = scene_.gravity * scene_.body.mass.transpose();
     clear(impulses);
     contact_.forget_reach();
     begin_between(h, state, impulses);
@@ -144,19 +144,21 @@ class ExplicitStepper final : public StepperOf<Dim> {
         force_ -= weight_;
       }
       hold(h, state, impulses);
+      const double before = dashpots_ ? std::sqrt(state.v.colwise().squaredNorm().maxCoeff()) : 0;  // contact's last forces may have stopped it
       double fastest = 0;
       for (int i = 0; i < scene_.body.node_count(); ++i) {
         state.v.col(i) += h * (inverse_mass_[i] * force_.col(i) + scene_.gravity);
         const double speed_squared = state.v.col(i).squaredNorm();
-        if (!(speed_squared <= fastest)) fastest = speed_squared;  // keeps what is not a number
+        if (speed_squared > fastest || std::isnan(speed_squared)) fastest = speed_squared;  // which stays what is not a number
       }
       impulses.gravity_moment += h * cross<Dim>(state.x * scene_.body.mass, scene_.gravity);
       const double farthest = h * std::sqrt(fastest);
       if (!(farthest < shortest_edge_)) {
         state = start_;
+        contact_.forget();
         return Termination::kDiverged;
       }
-      if (contact_.is_needed()) contact_.push_apart(h, std::sqrt(fastest), state, impulses);
+      if (contact_.is_needed()) contact_.push_apart(h, std::max(before, std::sqrt(fastest)), state, impulses);
       state.x += h * state.v;
     }
     if (is_between_) state.x -= (0.5 * h) * state.v;
@@ -232,7 +234,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
   double most_substeps_;
   StateOf<Dim> start_;
   StiffestModes at_rest_{};
-  double shortest_edge_ = 0;     // [m]
+  double shortest_edge_ = 0;  // [m]
   StepWork work_;
 };
 

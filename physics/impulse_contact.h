@@ -24,8 +24,8 @@ class ImpulseContact {
     impulse_.setZero();
     given_.setZero();
   }
-  /// Adds forces that go on all through this substep, learned from the last one's impulses [N], and books them: push_apart then
-  /// does and books what these lack or have too much.
+  /// Adds forces [N] that go on all through this substep, learned from the impulses of the last one, and books them: push_apart
+  /// then does and books what these lack or have too much.
   void add_last_forces(double h, const StateOf<Dim>& state, PointsOf<Dim>& force, ImpulsesOf<Dim>& impulses);
   /// Changes state.v so that state.x may move on by h state.v, books the impulses and moves the obstacles on.
   /// `fastest` [m/s]: no node is faster before contact.

@@ -77,7 +77,7 @@ class XpbdStepper final : public StepperOf<Dim> {
       double fastest = 0;
       for (int i = 0; i < body.node_count(); ++i) {
         const double speed_squared = state.v.col(i).squaredNorm();
-        if (!(speed_squared <= fastest)) fastest = speed_squared;  // keeps what is not a number
+        if (speed_squared > fastest || std::isnan(speed_squared)) fastest = speed_squared;  // keeps what is not a number
       }
       if (!(h * std::sqrt(fastest) < kRunaway * size_)) {
         state = start_;

@@ -120,7 +120,7 @@ std::vector<EffectReport> effects_of(const Performer& performer, const ReplayOpt
        has_elements ? "a part of the elements' law, as far as Poisson's ratio says; counted there"
                     : "the body keeps the volume of each tet by a spring",
        ms(std::max(0.0, elastic - edges_alone) * passes)},
-      {"damping", "on", "a dashpot along every constraint; timed by themselves",
+      {"damping", "on", "a dashpot along every constraint; timed by itself",
        ms(damping * passes)},
       {"air_drag", "off", "a creature moves in still air without drag; scenes have [air]", 0},
       {"water", "off", "there is no water", 0},

@@ -132,7 +132,7 @@ std::vector<EffectReport> effects_of(const ScenarioOf<Dim>& scenario, const Simu
                      1000 * itself});
   tell("volume", has_volume_springs || !body.elements.empty(), "nothing keeps volume", "",
        has_volume_springs ? ms_of_volume(body, state, passive, ms_of) : 0);
-  tell("damping", has_damping, "damping_time_s is 0", "timed by themselves",
+  tell("damping", has_damping, "damping_time_s is 0", "timed by itself",
        has_damping ? 1000 * passes * damping_seconds(scene, options.method, options.dt_s, state) : 0);
   tell("air_drag", scene.air.has_value(), "the scene tells of no air", "one pass over the surface a step", cost_of_fluid(scene.air));
   tell("water", scene.water.has_value(), "there is no water", "buoyancy and drag, one pass over the surface a step",

@@ -18,9 +18,10 @@ double substep_with(physics::SceneOf<Dim> scene, double damping_share, double dt
   return physics::make_explicit_stepper(scene)->substep(dt);
 }
 
-/// The largest share of the damping with which a step takes no more than what is wanted, 0 where none does.
+/// A share of the damping with which a step takes no more than what is wanted and a little more than which it does not; 0 where
+/// none does.
 template <int Dim>
-double largest_share(const physics::SceneOf<Dim>& scene, double wanted, double dt) {
+double share_that_does(const physics::SceneOf<Dim>& scene, double wanted, double dt) {
   if (substep_with<Dim>(scene, 0, dt) < wanted) return 0;
   double low = kLeastShare, high = 1;
   while (high > kExactness * low) {
@@ -36,7 +37,7 @@ template <int Dim>
 std::string explicit_step_warning(const physics::SceneOf<Dim>& scene, double dt, double damping_time) {
   const double h = substep_with<Dim>(scene, 1, dt), wanted = dt / kMostSubsteps;
   if (h >= wanted) return {};
-  const double share = largest_share<Dim>(scene, wanted, dt);
+  const double share = share_that_does<Dim>(scene, wanted, dt);
   char text[320];
   const int count = std::snprintf(text, sizeof text,
                                   "method 'explicit' would want %.0f substeps of a step, where it may take %.0f: its guard 'euler' takes "

@@ -211,10 +211,12 @@ Eigen::Vector<double, kContactCount> contact_counts_of(const Run& run) {
           potential.pushes};
 }
 
+bool goes_in_stages(physics::Method method) { return method == physics::Method::kExplicit || method == physics::Method::kSpring; }
+
 /// Whether a method pays for a cost at all.
 bool is_paid(physics::Method method, Eigen::Index cost) {
   if (cost == kProduct) return true;
-  if (cost > kProduct) return method == physics::Method::kExplicit;
+  if (cost > kProduct) return goes_in_stages(method);
   const double StepParts::*part = kParts[static_cast<std::size_t>(cost % kPartCount)].value;
   const bool is_active = part == &StepParts::active_simplices || part == &StepParts::active_boxes;
   const bool is_of_elements = is_active || part == &StepParts::volumes || part == &StepParts::simplices ||
@@ -290,7 +292,7 @@ void write_costs(const Eigen::VectorXd& costs, physics::Method method, std::ofst
     out << '}';
   }
   out << ", " << number(costs[kProduct]);
-  if (method == physics::Method::kExplicit) out << ", " << number(costs[kStage]) << ", " << number(costs[kPlacing]);
+  if (goes_in_stages(method)) out << ", " << number(costs[kStage]) << ", " << number(costs[kPlacing]);
   out << "},  // " << physics::name_of(method) << '\n';
 }
 

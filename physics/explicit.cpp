@@ -15,6 +15,7 @@ constexpr double kStepMargin = 0.8;  // of the linear stability bound
 constexpr double kStagedCost = 1.5;
 constexpr double kStageCost = 0.2;
 constexpr int kMostStages = 15;
+constexpr double kWorth = 2;  // of the cost without stages over that with them: a long substep also blurs when a foot takes hold
 constexpr int kStiffeningPlacings = 2;  // what looking for the dashpots' stiffening once costs
 
 struct StiffestMode {
@@ -92,7 +93,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
         is_between_(!scene.body.elements.empty()),
         most_substeps_(most_substeps) {
     at_rest_ = stiffest_modes_at_rest(scene.body, forces_);
-    if (cost(cheapest_stages(1, 1), 1, 1) < 1 / plain_substep(1)) dashpots_.emplace(scene.body);
+    if (kWorth * cost(cheapest_stages(1, 1), 1, 1) < 1 / plain_substep(1)) dashpots_.emplace(scene.body);
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
 

@@ -122,7 +122,7 @@ TYPED_TEST(Explicit, KeepsTheSubstepOfTheElasticForcesWhereDashpotsWouldWantAMuc
     return make_explicit_stepper(in_the_air(bar<Dim>(4, 2, 2, 0.1, damped_by<Dim>(damping_time)), false))->substep(1);
   };
   const double undamped = substep_of(0);
-  for (const double damping_time : {0.01, 0.03, 0.1}) {
+  for (const double damping_time : {0.03, 0.1}) {
     SCOPED_TRACE("damping " + std::to_string(damping_time) + " s");
     const double h = substep_of(damping_time);
     EXPECT_LE(h, 1.001 * undamped);

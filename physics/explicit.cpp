@@ -15,7 +15,10 @@ constexpr double kStepMargin = 0.8;  // of the linear stability bound
 constexpr double kStagedCost = 1.5;
 constexpr double kStageCost = 0.2;
 constexpr int kMostStages = 15;
-constexpr double kWorth = 2;  // of the cost without stages over that with them: a long substep also blurs when a foot takes hold
+constexpr double kWorth = 2;  // of the cost without stages over that with them
+// Contact's forces come to what is lacking in 1 / phi substeps, of dashpots of rate d in about 1.4 h^2 d.
+constexpr double kLate = 1.4;
+constexpr double kLatest = 0.25;  // of the outer step
 constexpr int kStiffeningPlacings = 2;  // what looking for the dashpots' stiffening once costs
 
 struct StiffestMode {
@@ -93,11 +96,11 @@ class ExplicitStepper final : public StepperOf<Dim> {
         is_between_(!scene.body.elements.empty()),
         most_substeps_(most_substeps) {
     at_rest_ = stiffest_modes_at_rest(scene.body, forces_);
-    if (kWorth * cost(cheapest_stages(1, 1), 1, 1) < 1 / plain_substep(1)) dashpots_.emplace(scene.body);
+    if (at_rest_.apart.damping > 0) dashpots_.emplace(scene.body);
     shortest_edge_ = scene.body.rest_length.minCoeff();
   }
 
-  double substep(double dt) const override { return dt / std::ceil(dt / longest_substep(1, 1)); }
+  double substep(double dt) const override { return dt / std::ceil(dt / (is_staged(dt) ? staged_substep(dt, 1, 1) : plain_substep(1))); }
 
   StepWork work() const override {
     StepWork work = work_;
@@ -112,15 +115,16 @@ class ExplicitStepper final : public StepperOf<Dim> {
     if (!forces_.set_activation(activation)) return Termination::kDiverged;
     start_ = state;
     // The bound at rest, shortened by as much as the shape from which the step starts is stiffer.
-    const double stiffer = forces_.stiffening(state.x), more_damped = dashpots_ ? dashpots_->stiffening(state.x) : 1;
-    const double count = std::ceil(dt / longest_substep(stiffer, more_damped));
+    const bool is_in_stages = is_staged(dt);
+    const double stiffer = forces_.stiffening(state.x), more_damped = is_in_stages ? dashpots_->stiffening(state.x) : 1;
+    const double count = std::ceil(dt / (is_in_stages ? staged_substep(dt, stiffer, more_damped) : plain_substep(stiffer)));
     if (!(count <= most_substeps_)) return Termination::kDiverged;
     const int substeps = static_cast<int>(count);
     work_.passes += substeps;
     work_.rounds += substeps;
     const double h = dt / substeps;
-    const int stages = dashpots_ ? stages_for(h, more_damped) : 0;
-    if (dashpots_) {
+    const int stages = is_in_stages ? stages_for(h, more_damped) : 0;
+    if (is_in_stages) {
       work_.stages += substeps * stages;
       work_.placings += substeps + kStiffeningPlacings;
       weight_.noalias() = scene_.gravity * scene_.body.mass.transpose();
@@ -130,7 +134,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
     begin_between(h, state, impulses);
     for (int s = 0; s < substeps; ++s) {
       force_.setZero();
-      dashpots_ ? forces_.add_elastic_forces(state.x, force_) : forces_.add_forces(state, force_);
+      is_in_stages ? forces_.add_elastic_forces(state.x, force_) : forces_.add_forces(state, force_);
       if (effect_force != nullptr) {
         force_ += *effect_force;
         impulses.effect_nodes += h * *effect_force;
@@ -138,14 +142,14 @@ class ExplicitStepper final : public StepperOf<Dim> {
           impulses.effect_moment += h * cross<Dim>(state.x.col(i), effect_force->col(i));
         }
       }
-      if (dashpots_) {
+      if (is_in_stages) {
         if (contact_.is_needed()) contact_.add_last_forces(h, state, force_, impulses);
         force_ += weight_;  // which the dashpots of held nodes brake
         dashpots_->add_mean_forces(state.x, state.v, h, stages, force_);
         force_ -= weight_;
       }
       hold(h, state, impulses);
-      const double before = dashpots_ ? std::sqrt(state.v.colwise().squaredNorm().maxCoeff()) : 0;  // contact's last forces may have stopped it
+      const double before = is_in_stages ? std::sqrt(state.v.colwise().squaredNorm().maxCoeff()) : 0;  // contact's last forces may have stopped it
       double fastest = 0;
       for (int i = 0; i < scene_.body.node_count(); ++i) {
         state.v.col(i) += h * (inverse_mass_[i] * force_.col(i) + scene_.gravity);
@@ -175,25 +179,29 @@ class ExplicitStepper final : public StepperOf<Dim> {
   double plain_substep(double stiffer) const {
     return kStepMargin * hydrostat::physics::longest_substep({at_rest_.together.damping, stiffer * at_rest_.together.frequency_squared});
   }
-  double staged_substep(int stages, double stiffer, double more_damped) const {
-    const StiffestMode& mode = at_rest_.apart;
-    return kStepMargin * std::min(2 / std::sqrt(stiffer * mode.frequency_squared),
-                                  DashpotStages<Dim>::reach(stages) / (more_damped * mode.damping));
+  double staged_substep(int stages, double dt, double stiffer, double more_damped) const {
+    const double damping = more_damped * at_rest_.apart.damping;
+    double h = kStepMargin * std::min(2 / std::sqrt(stiffer * at_rest_.apart.frequency_squared), DashpotStages<Dim>::reach(stages) / damping);
+    if (contact_.is_needed()) h = std::min(h, std::sqrt(kLatest * dt / (kLate * damping)));
+    return h;
   }
-  double longest_substep(double stiffer, double more_damped) const {
-    return dashpots_ ? staged_substep(cheapest_stages(stiffer, more_damped), stiffer, more_damped) : plain_substep(stiffer);
+  double staged_substep(double dt, double stiffer, double more_damped) const {
+    return staged_substep(cheapest_stages(dt, stiffer, more_damped), dt, stiffer, more_damped);
   }
 
   /// Of a simulated second, in plain substeps.
-  double cost(int stages, double stiffer, double more_damped) const {
-    return (kStagedCost + kStageCost * stages) / staged_substep(stages, stiffer, more_damped);
+  double cost(int stages, double dt, double stiffer, double more_damped) const {
+    return (kStagedCost + kStageCost * stages) / staged_substep(stages, dt, stiffer, more_damped);
   }
-  int cheapest_stages(double stiffer, double more_damped) const {
+  int cheapest_stages(double dt, double stiffer, double more_damped) const {
     int best = 3;
     for (int stages = 5; stages <= kMostStages; stages += 2) {
-      if (cost(stages, stiffer, more_damped) < cost(best, stiffer, more_damped)) best = stages;
+      if (cost(stages, dt, stiffer, more_damped) < cost(best, dt, stiffer, more_damped)) best = stages;
     }
     return best;
+  }
+  bool is_staged(double dt) const {
+    return dashpots_ && kWorth * cost(cheapest_stages(dt, 1, 1), dt, 1, 1) < 1 / plain_substep(1);
   }
   /// As few as a substep of h [s] asks for.
   int stages_for(double h, double more_damped) const {
@@ -230,7 +238,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
   PointsOf<Dim> weight_;        // [N]
   Eigen::VectorXd inverse_mass_;
   ImpulseContact<Dim> contact_;
-  std::optional<DashpotStages<Dim>> dashpots_;  // where they go in stages
+  std::optional<DashpotStages<Dim>> dashpots_;  // where there are any
   bool is_between_;  // substeps take their forces between the places that the steps tell
   double most_substeps_;
   StateOf<Dim> start_;

@@ -9,7 +9,6 @@ namespace {
 constexpr double kReach = 0.1;  // of the shortest edge [-]: places as near as that are watched
 constexpr int kSweeps = 30;
 constexpr double kTolerance = 1e-7;  // [m/s] change of a place's velocity in a sweep
-constexpr double kOvershoot = 0.8;   // of what the last forces lacked: it is that of one node, which drags others along
 
 }  // namespace
 
@@ -89,14 +88,13 @@ double ImpulseContact<Dim>::sweep(StateOf<Dim>& state) {
   return change;
 }
 
-/// What the contact's last forces lacked was measured on places that the dashpots tied to others within the substep: the whole
-/// that is lacking is up to 1 / phi times as much (DashpotStages). As phi is 1 at most, forces that each time add less than twice
-/// what was measured come to an end.
+/// What these forces lack is measured on places that the dashpots tied to others within the substep: of what is lacking in all it is
+/// phi (DashpotStages), 1 at most, so that the forces come to it without swinging. More than that at once would let them swing where phi
+/// is near 1, and feet slip whenever the normal force is at its least.
 template <int Dim>
 void ImpulseContact<Dim>::add_last_forces(double h, const StateOf<Dim>& state, PointsOf<Dim>& force, ImpulsesOf<Dim>& impulses) {
   has_given_ = true;
   for (ContactOf<Dim>& contact : set_.candidates()) {
-    const VectorOf<Dim> given = given_.col(contact.slot);
     given_.col(contact.slot).setZero();
     if (impulse_.col(contact.slot).squaredNorm() == 0) continue;
     set_.update(state.x, state.obstacle_travel, contact);
@@ -104,8 +102,8 @@ void ImpulseContact<Dim>::add_last_forces(double h, const StateOf<Dim>& state, P
       impulse_.col(contact.slot).setZero();
       continue;
     }
-    const VectorOf<Dim> sought = (h / last_h_) * (impulse_.col(contact.slot) + kOvershoot * (impulse_.col(contact.slot) - given));
-    const VectorOf<Dim> next = impulse_in_cone<Dim>(contact, VectorOf<Dim>::Zero(), 0, set_.friction(contact), sought);
+    const VectorOf<Dim> last = (h / last_h_) * impulse_.col(contact.slot);  // its normal was another
+    const VectorOf<Dim> next = impulse_in_cone<Dim>(contact, VectorOf<Dim>::Zero(), 0, set_.friction(contact), last);
     impulse_.col(contact.slot) = next;
     given_.col(contact.slot) = next;
     for (int k = 0; k < contact.node_count; ++k) {
@@ -126,6 +124,7 @@ void ImpulseContact<Dim>::push_apart(double h, double fastest, StateOf<Dim>& sta
   if (reach_ < 0) find_candidates(farthest, state);
   if (set_.candidates().empty()) {
     active_.clear();
+    has_given_ = false;
     set_.move_obstacles(h, state.obstacle_travel);
     return;
   }
@@ -134,6 +133,7 @@ void ImpulseContact<Dim>::push_apart(double h, double fastest, StateOf<Dim>& sta
     if (sweep(state) < kTolerance) break;
   }
   book(state, impulses);
+  has_given_ = false;
   set_.move_obstacles(h, state.obstacle_travel);
 }
 

@@ -47,7 +47,7 @@ class ImpulseContact {
   Eigen::VectorXd inverse_mass_;
   PointsOf<Dim> impulse_;     // [N s] Dim x slots, of the last substep
   PointsOf<Dim> given_;       // [N s] Dim x slots: what of it came as a force
-  bool has_given_ = false;
+  bool has_given_ = false;    // in this substep
   double last_h_ = 0;         // [s]
   double shortest_edge_ = 0;  // [m]
   double push_out_speed_ = 0;

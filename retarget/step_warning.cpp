@@ -8,8 +8,7 @@ namespace {
 
 constexpr double kMostSubsteps = 2000;  // as make_explicit_stepper has it
 constexpr double kSpare = 0.7;          // of the damping time that would just do at rest: bodies stiffen when they deform
-
-constexpr double kExactness = 1.05;     // of the share that is sought
+constexpr double kStride = 1.5, kExactness = 1.05;  // between shares that are tried, and of the one that is found
 constexpr double kLeastShare = 1e-6;
 
 template <int Dim>
@@ -18,12 +17,16 @@ double substep_with(physics::SceneOf<Dim> scene, double damping_share, double dt
   return physics::make_explicit_stepper(scene)->substep(dt);
 }
 
-/// A share of the damping with which a step takes no more than what is wanted and a little more than which it does not; 0 where
-/// none does.
+/// The largest share of the damping with which a step takes no more than what is wanted, 0 where none does. It is sought from above, for
+/// dashpots that go in stages may do where weaker ones, that do not yet, would not.
 template <int Dim>
-double share_that_does(const physics::SceneOf<Dim>& scene, double wanted, double dt) {
-  if (substep_with<Dim>(scene, 0, dt) < wanted) return 0;
-  double low = kLeastShare, high = 1;
+double largest_share(const physics::SceneOf<Dim>& scene, double wanted, double dt) {
+  double high = 1, low = high;
+  while (substep_with<Dim>(scene, low, dt) < wanted) {
+    high = low;
+    low /= kStride;
+    if (low < kLeastShare) return 0;
+  }
   while (high > kExactness * low) {
     const double middle = std::sqrt(low * high);
     (substep_with<Dim>(scene, middle, dt) < wanted ? high : low) = middle;
@@ -37,7 +40,7 @@ template <int Dim>
 std::string explicit_step_warning(const physics::SceneOf<Dim>& scene, double dt, double damping_time) {
   const double h = substep_with<Dim>(scene, 1, dt), wanted = dt / kMostSubsteps;
   if (h >= wanted) return {};
-  const double share = share_that_does<Dim>(scene, wanted, dt);
+  const double share = largest_share<Dim>(scene, wanted, dt);
   char text[320];
   const int count = std::snprintf(text, sizeof text,
                                   "method 'explicit' would want %.0f substeps of a step, where it may take %.0f: its guard 'euler' takes "

@@ -155,7 +155,7 @@ METHOD_TEST(Steppers, PushFromTheGroundInsideTheConeWhereItIsTouched) {
     for (int i = 0; i < scene.body.node_count(); ++i) start.v.col(i) = vec<Dim>(1, -0.5, 0.5);
     const VectorOf<Dim> normal = scene.ground.normal;
     int pushes = 0;
-    run<Dim>(method, scene, start, 300,
+    run<Dim>(method, scene, start, 240,
         [&](const StateOf<Dim>& before, const StateOf<Dim>& after, const ImpulsesOf<Dim>& impulses) {
           for (int p = 0; p < scene.contact_points.count(); ++p) {
             const VectorOf<Dim> impulse = impulses.contact.col(p);

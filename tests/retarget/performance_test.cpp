@@ -150,7 +150,7 @@ TEST(CountTrialsLost, IsNoneOfWhatStandsAndAllOfWhatFalls) {
   EXPECT_EQ(count_trials_lost(performer, signals, options), 0);
   options.threads = 1;
   options.feedback = {1, 0.5, 10.0 / 3};
-  options.replay.observation.delay_s = 0.1;
+  options.replay.observation.delay_s = 0.07;
   options.replay.duration_s = 1.5;
   const int lost = count_trials_lost(performer, signals, options);
   EXPECT_EQ(lost, static_cast<int>(kTrials.size()));

@@ -95,7 +95,6 @@ TEST(Polish, LeavesWhatFallsAsItWas) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1.5);
-  options.feedback = {1, 0.5, 10.0 / 3};
   options.replay.observation.delay_s = 0.1;
   PolishOptions long_enough = quick();
   long_enough.first_cycles = 8;

@@ -148,15 +148,11 @@ double rolled(double speed, bool is_braced) {
 }
 
 TEST(RollBrace, ALogThatIsPushedFromTheSideRollsOnUnlessItBends) {
-  double braced = 0;
   for (const double speed : {-1.2, -1.0, -0.8, -0.6, 0.6, 0.8, 1.0, 1.2}) {
     SCOPED_TRACE(speed);
     EXPECT_GT(rolled(speed, false), 2);
-    const double roll = rolled(speed, true);
-    EXPECT_LT(roll, 0.6);  // one in ten comes to rest on a corner
-    braced += roll / 8;
+    EXPECT_LT(rolled(speed, true), 0.4);
   }
-  EXPECT_LT(braced, 0.15);
 }
 
 }  // namespace

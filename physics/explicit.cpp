@@ -15,10 +15,10 @@ constexpr double kStepMargin = 0.8;  // of the linear stability bound
 constexpr double kStagedCost = 1.5;
 constexpr double kStageCost = 0.2;
 constexpr int kMostStages = 15;
-constexpr double kWorth = 2;  // of the cost without stages over that with them
+constexpr double kWorth = 1.5;  // of the cost without stages over that with them
 // Contact's forces come to what is lacking in 1 / phi substeps, of dashpots of rate d in about 1.4 h^2 d.
 constexpr double kLate = 1.4;
-constexpr double kLatest = 0.25;  // of the outer step
+constexpr double kLatest = 0.01;  // of the time in which the body falls by half its size
 constexpr int kStiffeningPlacings = 2;  // what looking for the dashpots' stiffening once costs
 
 struct StiffestMode {
@@ -98,6 +98,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
     at_rest_ = stiffest_modes_at_rest(scene.body, forces_);
     if (at_rest_.apart.damping > 0) dashpots_.emplace(scene.body);
     shortest_edge_ = scene.body.rest_length.minCoeff();
+    const double gravity = scene.gravity.norm() > 0 ? scene.gravity.norm() : 9.81;
+    latest_ = kLatest * std::sqrt(size_of_volume<Dim>(scene.body.rest_volume.sum()) / gravity);
   }
 
   double substep(double dt) const override { return dt / std::ceil(dt / (is_staged(dt) ? staged_substep(dt, 1, 1) : plain_substep(1))); }
@@ -179,19 +181,19 @@ class ExplicitStepper final : public StepperOf<Dim> {
   double plain_substep(double stiffer) const {
     return kStepMargin * hydrostat::physics::longest_substep({at_rest_.together.damping, stiffer * at_rest_.together.frequency_squared});
   }
-  double staged_substep(int stages, double dt, double stiffer, double more_damped) const {
+  double staged_substep(int stages, double stiffer, double more_damped) const {
     const double damping = more_damped * at_rest_.apart.damping;
     double h = kStepMargin * std::min(2 / std::sqrt(stiffer * at_rest_.apart.frequency_squared), DashpotStages<Dim>::reach(stages) / damping);
-    if (contact_.is_needed()) h = std::min(h, std::sqrt(kLatest * dt / (kLate * damping)));
+    if (contact_.is_needed()) h = std::min(h, std::sqrt(latest_ / (kLate * damping)));
     return h;
   }
   double staged_substep(double dt, double stiffer, double more_damped) const {
-    return staged_substep(cheapest_stages(dt, stiffer, more_damped), dt, stiffer, more_damped);
+    return staged_substep(cheapest_stages(dt, stiffer, more_damped), stiffer, more_damped);
   }
 
-  /// Of a simulated second, in plain substeps.
+  /// Of a step of dt [s], in plain substeps.
   double cost(int stages, double dt, double stiffer, double more_damped) const {
-    return (kStagedCost + kStageCost * stages) / staged_substep(stages, dt, stiffer, more_damped);
+    return (kStagedCost + kStageCost * stages) * std::ceil(dt / staged_substep(stages, stiffer, more_damped));
   }
   int cheapest_stages(double dt, double stiffer, double more_damped) const {
     int best = 3;
@@ -201,7 +203,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
     return best;
   }
   bool is_staged(double dt) const {
-    return dashpots_ && kWorth * cost(cheapest_stages(dt, 1, 1), dt, 1, 1) < 1 / plain_substep(1);
+    return dashpots_ && kWorth * cost(cheapest_stages(dt, 1, 1), dt, 1, 1) < std::ceil(dt / plain_substep(1));
   }
   /// As few as a substep of h [s] asks for.
   int stages_for(double h, double more_damped) const {
@@ -244,6 +246,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
   StateOf<Dim> start_;
   StiffestModes at_rest_{};
   double shortest_edge_ = 0;  // [m]
+  double latest_ = 0;         // [s] that contact's forces may come late
   StepWork work_;
 };
 

@@ -135,7 +135,7 @@ TYPED_TEST(Explicit, HoldsWhatDashpotsTieToAFootAsMuchShorterSubstepsDo) {
   constexpr int Dim = TypeParam::kDim;
   for (const double friction : {0.2, 0.8, 2.0}) {
     SCOPED_TRACE("friction " + std::to_string(friction));
-    const BodyOf<Dim> body = four_legged<Dim>(damped_by<Dim>(0.02));
+    const BodyOf<Dim> body = four_legged<Dim>(damped_by<Dim>(0.05));
     SceneOf<Dim> scene = scene_of(body, soles(body), slope<Dim>(0, friction));
     const auto path = [&](int steps, bool in_stages) {
       const std::unique_ptr<StepperOf<Dim>> stepper = make_explicit_stepper(scene);

@@ -15,7 +15,7 @@ constexpr double kStepMargin = 0.8;  // of the linear stability bound
 constexpr double kStagedCost = 1.5;
 constexpr double kStageCost = 0.2;
 constexpr int kMostStages = 15;
-constexpr double kWorth = 1.5;  // of the cost without stages over that with them
+constexpr double kWorth = 2;  // of the cost without stages over that with them
 // Contact's forces come to what is lacking in 1 / phi substeps, of dashpots of rate d in about 1.4 h^2 d.
 constexpr double kLate = 1.4;
 constexpr double kLatest = 0.01;  // of the time in which the body falls by half its size

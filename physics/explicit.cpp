@@ -181,19 +181,19 @@ class ExplicitStepper final : public StepperOf<Dim> {
   double plain_substep(double stiffer) const {
     return kStepMargin * hydrostat::physics::longest_substep({at_rest_.together.damping, stiffer * at_rest_.together.frequency_squared});
   }
-  double staged_substep(int stages, double stiffer, double more_damped) const {
+  double substep_in_stages(int stages, double stiffer, double more_damped) const {
     const double damping = more_damped * at_rest_.apart.damping;
     double h = kStepMargin * std::min(2 / std::sqrt(stiffer * at_rest_.apart.frequency_squared), DashpotStages<Dim>::reach(stages) / damping);
     if (contact_.is_needed()) h = std::min(h, std::sqrt(latest_ / (kLate * damping)));
     return h;
   }
   double staged_substep(double dt, double stiffer, double more_damped) const {
-    return staged_substep(cheapest_stages(dt, stiffer, more_damped), stiffer, more_damped);
+    return substep_in_stages(cheapest_stages(dt, stiffer, more_damped), stiffer, more_damped);
   }
 
   /// Of a step of dt [s], in plain substeps.
   double cost(int stages, double dt, double stiffer, double more_damped) const {
-    return (kStagedCost + kStageCost * stages) * std::ceil(dt / staged_substep(stages, stiffer, more_damped));
+    return (kStagedCost + kStageCost * stages) * std::ceil(dt / substep_in_stages(stages, stiffer, more_damped));
   }
   int cheapest_stages(double dt, double stiffer, double more_damped) const {
     int best = 3;

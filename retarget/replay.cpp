@@ -191,7 +191,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
   const bool is_seen = options.correct && options.observation.is_exact();
   if (is_seen && target_.loop && has_flight(input.prepared)) strength_.emplace(input.model, control_s_);
-  if (is_seen) brace_.emplace(input.prepared, input.scene.body, input.scene.gravity.norm());
+  if (is_seen) brace_.emplace(input.prepared, input.model);
   if (cost_) regulator_.emplace(input.model, input.muscles, input.length, input.limit, regulated(gain_, options));
   if (options.lesson) options.lesson->make_room(activation_.size(), state_.x.size(), steps_);
   if (!options.trace) return;
@@ -313,7 +313,7 @@ void Run::control() {
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
   stride_.follow(fit_, control_s_);
-  if (brace_) brace_->follow(fit_, time_s_, control_s_);
+  if (brace_) brace_->follow(fit_, reference_, seen, time_s_, control_s_);
   keep_way();
   leap_.apply(time_s_, glide_.yaw, yaw_of(fit_.rotation), physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
   contact_.upright = leap_.upright(time_s_);

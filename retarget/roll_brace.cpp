@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kSlender = 2;     // what is less slender rolls about no axis of its own
 constexpr double kByRoll = 0.6;    // activation per radian of roll
-constexpr double kByRate = 1.35;   // the same per radian in the time sqrt(h / g)
+constexpr double kByRate = 0.9;    // the same per radian in the time sqrt(h / g)
 constexpr double kIdle = 0.1;      // less is left alone: a crawl rolls by as much, and what answers to it rocks on
-constexpr double kMost = 0.39;     // activation
+constexpr double kMost = 0.5;      // activation
 constexpr double kSmoothing = 1.0 / 3;  // of sqrt(h / g)
 constexpr double kOwnPlane = 0.4;  // share of the body's own side in that to which it bends; the rest is level
 
@@ -19,7 +19,9 @@ Eigen::Vector3d level_left_of(const Eigen::Vector3d& way) { return Eigen::Vector
 
 }  // namespace
 
-RollBrace::RollBrace(const PreparedTarget& plan, const physics::Body& body, double gravity) {
+RollBrace::RollBrace(const PreparedTarget& plan, const physics::Scene& scene) : scene_(scene) {
+  const physics::Body& body = scene.body;
+  const double gravity = scene.gravity.norm();
   if (!is_dragged(plan.contacts) || gravity <= 0) return;
   const LongAxis axis = long_axis(body, plan.target);
   if (axis.slenderness < kSlender) return;
@@ -27,16 +29,27 @@ RollBrace::RollBrace(const PreparedTarget& plan, const physics::Body& body, doub
   bends_ = bends_across(axis, body.edges);
   bends_ /= (bends_ * level_left_of(along_)).cwiseAbs().maxCoeff();
   if (plan.target.yaw != 0) turn_per_s_ = plan.target.yaw / plan.target.duration_s();
-  swing_s_ = std::sqrt(std::max(0.0, physics::centre_of_mass(body, plan.target.at(0)).y()) / gravity);
+  swing_s_ = std::sqrt(std::max(0.0, physics::centre_of_mass(body, plan.target.at(0)).y() - scene.ground.offset) / gravity);
 }
 
-void RollBrace::follow(const RigidFit& fit, double time_s, double seconds) {
+/// Angular momentum [kg m2/s] about the level line across `left`, on the ground under the centre of mass, and the moment of inertia [kg m2]
+/// about it.
+double RollBrace::rolling(const physics::State& state, const Eigen::Vector3d& left, double& inertia) const {
+  const Eigen::Vector3d way = left.cross(Eigen::Vector3d::UnitY());
+  Eigen::Vector3d below = physics::centre_of_mass(scene_.body, state.x);
+  below.y() = scene_.ground.offset;
+  inertia = way.dot(physics::inertia(scene_.body, state.x, below) * way);
+  return way.dot(physics::angular_momentum(scene_.body, state.x, state.v, below));
+}
+
+void RollBrace::follow(const RigidFit& fit, const physics::State& reference, const physics::State& state, double time_s, double seconds) {
   if (!is_needed()) return;
-  const Eigen::Matrix3d turned = fit.rotation * Eigen::AngleAxisd(turn_per_s_ * time_s, Eigen::Vector3d::UnitY());
-  const Eigen::Vector3d up = turned.col(1), way = turned * along_, left = level_left_of(way);
-  const double before = roll_;
+  const Eigen::Matrix3d meant(Eigen::AngleAxisd(turn_per_s_ * time_s, Eigen::Vector3d::UnitY())), turned = fit.rotation * meant;
+  const Eigen::Vector3d up = turned.col(1), left = level_left_of(turned * along_);
   roll_ = std::atan2(left.dot(up), up.y());
-  const double rate = std::remainder(roll_ - before, 2 * M_PI) / seconds;
+  double inertia = 0, meant_inertia = 0;
+  const double momentum = rolling(state, left, inertia) - rolling(reference, level_left_of(meant * along_), meant_inertia);
+  const double rate = inertia > 0 ? -momentum / inertia : 0;
   const double wanted = -(kByRoll * roll_ + kByRate * swing_s_ * rate);
   const double most = std::clamp(std::abs(wanted) - kIdle, 0.0, kMost);
   bend_ += (std::copysign(most, wanted) - bend_) * std::min(1.0, seconds / (kSmoothing * swing_s_));

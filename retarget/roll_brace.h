@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "physics/body.h"
+#include "physics/scene.h"
 #include "retarget/best_fit_rotation.h"
 #include "retarget/long_axis.h"
 #include "retarget/prepare.h"
@@ -12,16 +12,20 @@ namespace hydrostat::retarget {
 /// What lies on the ground and is long and round rolls like a log when it is pushed from the side, and its feedback along the way has no
 /// hold on that: nothing reaches out. A log that bends in the plane of the ground cannot roll on. This bends the body sideways, as a whole,
 /// by its roll and the rate of it beyond what a crawl does by itself; its plane is in part the body's own, which gravity lays flat, so
-/// that the body rolls back. Bodies on legs, and those that are not slender, have none. The bend is one of the body's own activations. The
-/// method is ours; gains were measured on a worm under pushes of 0.5 m/s in 8 directions.
+/// that the body rolls back. Bodies on legs, and those that are not slender, have none. The bend is one of the body's own activations.
+///
+/// The rate is that of the body's angular momentum about a line on the ground, along it and under its centre of mass. What a bend does at
+/// once, before gravity answers to it, turns the trunk the wrong way, and a feedback of the trunk's own rate feeds that: it rocks on for
+/// good. Momentum about the ground changes by gravity and contact alone, and so lies before what gravity can do about it. The method is
+/// ours; gains were measured on worms under pushes of 0.5 m/s in 8 directions.
 class RollBrace {
  public:
-  /// gravity [m/s2].
-  RollBrace(const PreparedTarget& plan, const physics::Body& body, double gravity);
+  /// The scene that the plan was made for, whose ground is level; it must outlive the brace.
+  RollBrace(const PreparedTarget& plan, const physics::Scene& scene);
 
   bool is_needed() const { return bends_.size() > 0; }
-  /// `fit`: from the target of `time_s` to the body, `seconds` after the last.
-  void follow(const RigidFit& fit, double time_s, double seconds);
+  /// `fit`: from the target of `time_s`, in the state `reference`, to the body in its `state`.
+  void follow(const RigidFit& fit, const physics::State& reference, const physics::State& state, double time_s, double seconds);
   /// Changes `activation`, E.
   void apply(Eigen::VectorXd& activation) const;
   /// The largest change of an activation; its sign tells the side.
@@ -30,6 +34,9 @@ class RollBrace {
   double roll() const { return roll_; }
 
  private:
+  double rolling(const physics::State& state, const Eigen::Vector3d& left, double& inertia) const;
+
+  const physics::Scene& scene_;
   double turn_per_s_ = 0;       // [rad/s] of the target, about y
   double swing_s_ = 0;          // sqrt(height / g)
   Eigen::Vector3d along_;       // of the target's first frame

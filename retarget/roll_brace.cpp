@@ -7,13 +7,13 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kSlender = 2;     // what is less slender rolls about no axis of its own
-constexpr double kByRoll = 0.6;    // activation per radian of roll
-constexpr double kByRate = 0.9;    // the same per radian in the time sqrt(h / g)
-constexpr double kIdle = 0.1;      // less is left alone: a crawl rolls by as much, and what answers to it rocks on
-constexpr double kMost = 0.5;      // activation
-constexpr double kSmoothing = 1.0 / 3;  // of sqrt(h / g)
-constexpr double kOwnPlane = 0.4;  // share of the body's own side in that to which it bends; the rest is level
+constexpr double kSlender = 2;         // what is less slender rolls about no axis of its own
+constexpr double kByRoll = 0.6;        // activation per radian of roll
+constexpr double kByRate = 0.9;        // the same per radian in the time sqrt(h / g)
+constexpr double kIdle = 0.1;          // less is left alone: a crawl rolls by as much, and what answers to it rocks on
+constexpr double kMost = 0.5;          // activation
+constexpr double kSmoothing = 0.25;     // of sqrt(h / g)
+constexpr double kOwnPlane = 0.4;      // share of the body's own side in that to which it bends; the rest is level
 
 Eigen::Vector3d level_left_of(const Eigen::Vector3d& way) { return Eigen::Vector3d::UnitY().cross(way).normalized(); }
 

@@ -9,10 +9,11 @@ namespace {
 
 constexpr double kSlender = 2;         // what is less slender rolls about no axis of its own
 constexpr double kByRoll = 0.6;        // activation per radian of roll
-constexpr double kByRate = 0.9;        // the same per radian in the time sqrt(h / g)
+constexpr double kByRate = 0.7;        // the same per radian in the time sqrt(h / g)
+constexpr double kTrunk = 0.3;         // share of the trunk's own rate in that; the rest is the body's momentum about the ground
 constexpr double kIdle = 0.1;          // less is left alone: a crawl rolls by as much, and what answers to it rocks on
 constexpr double kMost = 0.5;          // activation
-constexpr double kSmoothing = 0.25;     // of sqrt(h / g)
+constexpr double kSmoothing = 0.15;    // of sqrt(h / g)
 constexpr double kOwnPlane = 0.4;      // share of the body's own side in that to which it bends; the rest is level
 
 Eigen::Vector3d level_left_of(const Eigen::Vector3d& way) { return Eigen::Vector3d::UnitY().cross(way).normalized(); }
@@ -46,10 +47,12 @@ void RollBrace::follow(const RigidFit& fit, const physics::State& reference, con
   if (!is_needed()) return;
   const Eigen::Matrix3d meant(Eigen::AngleAxisd(turn_per_s_ * time_s, Eigen::Vector3d::UnitY())), turned = fit.rotation * meant;
   const Eigen::Vector3d up = turned.col(1), left = level_left_of(turned * along_);
+  const double before = roll_;
   roll_ = std::atan2(left.dot(up), up.y());
   double inertia = 0, meant_inertia = 0;
   const double momentum = rolling(state, left, inertia) - rolling(reference, level_left_of(meant * along_), meant_inertia);
-  const double rate = inertia > 0 ? -momentum / inertia : 0;
+  const double of_trunk = std::remainder(roll_ - before, 2 * M_PI) / seconds, of_all = inertia > 0 ? -momentum / inertia : 0;
+  const double rate = kTrunk * of_trunk + (1 - kTrunk) * of_all;
   const double wanted = -(kByRoll * roll_ + kByRate * swing_s_ * rate);
   const double most = std::clamp(std::abs(wanted) - kIdle, 0.0, kMost);
   bend_ += (std::copysign(most, wanted) - bend_) * std::min(1.0, seconds / (kSmoothing * swing_s_));

@@ -45,13 +45,16 @@ TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
   EXPECT_NEAR(std::stod(climbed.out.substr(travel + 7)), 0.435, 0.02) << climbed.out;  // L a cycle
 }
 
-TEST(Pushes, TheWormDoesNotRollAwayFromThoseThatComeFromTheSide) {
+TEST(Pushes, TheWormDoesNotRollAwayFromThoseThatComeFromTheSideAndComesToRest) {
   const TemporaryDirectory directory;
   convert(directory.path, "worm_crawl.glb", "creature", "--nodes 100");
   for (const char* push : {"0.5:0:0", "-0.5:0:0"}) {
     const Outcome pushed =
         hydrostat_in(directory.path, std::string("replay creature --quiet --cycles 4 -o pushed.glb --push t=4.5,dv=") + push);
     EXPECT_EQ(pushed.exit_code, 0) << push << ": " << pushed.out << pushed.err;
+    const std::size_t shape = pushed.out.find("shape ");
+    ASSERT_NE(shape, std::string::npos) << pushed.out;
+    EXPECT_LT(std::stod(pushed.out.substr(shape + 6)), 2) << pushed.out;  // % L: the mean of one that rocks on is 2.6 and more
   }
 }
 

@@ -25,7 +25,7 @@ class RollBrace {
   RollBrace(const PreparedTarget& plan, const physics::Scene& scene);
 
   bool is_needed() const { return bends_.size() > 0; }
-  /// `fit`: from the target of `time_s`, in the state `reference`, to the body in its `state`.
+  /// `fit`: from the target of `time_s`, in the state `reference`, to the body in its `state`, `seconds` after the last.
   void follow(const RigidFit& fit, const physics::State& reference, const physics::State& state, double time_s, double seconds);
   /// Changes `activation`, E.
   void apply(Eigen::VectorXd& activation) const;

@@ -18,6 +18,24 @@ constexpr double kOwnPlane = 0.4;      // share of the body's own side in that t
 
 Eigen::Vector3d level_left_of(const Eigen::Vector3d& way) { return Eigen::Vector3d::UnitY().cross(way).normalized(); }
 
+/// [m] on the ground, below the centre of mass.
+Eigen::Vector3d foot_point(const physics::Scene& scene, const physics::State& state) {
+  Eigen::Vector3d point = physics::centre_of_mass(scene.body, state.x);
+  point.y() = scene.ground.offset;
+  return point;
+}
+
+/// Angular momentum [kg m2/s] about the level line across `left` through that point.
+double rolling_momentum(const physics::Scene& scene, const physics::State& state, const Eigen::Vector3d& left) {
+  return left.cross(Eigen::Vector3d::UnitY()).dot(physics::angular_momentum(scene.body, state.x, state.v, foot_point(scene, state)));
+}
+
+/// Moment of inertia [kg m2] about that line.
+double rolling_inertia(const physics::Scene& scene, const physics::State& state, const Eigen::Vector3d& left) {
+  const Eigen::Vector3d way = left.cross(Eigen::Vector3d::UnitY());
+  return way.dot(physics::inertia(scene.body, state.x, foot_point(scene, state)) * way);
+}
+
 }  // namespace
 
 RollBrace::RollBrace(const PreparedTarget& plan, const physics::Scene& scene) : scene_(scene) {
@@ -33,25 +51,15 @@ RollBrace::RollBrace(const PreparedTarget& plan, const physics::Scene& scene) : 
   swing_s_ = std::sqrt(std::max(0.0, physics::centre_of_mass(body, plan.target.at(0)).y() - scene.ground.offset) / gravity);
 }
 
-/// Angular momentum [kg m2/s] about the level line across `left`, on the ground under the centre of mass, and the moment of inertia [kg m2]
-/// about it.
-double RollBrace::rolling(const physics::State& state, const Eigen::Vector3d& left, double& inertia) const {
-  const Eigen::Vector3d way = left.cross(Eigen::Vector3d::UnitY());
-  Eigen::Vector3d below = physics::centre_of_mass(scene_.body, state.x);
-  below.y() = scene_.ground.offset;
-  inertia = way.dot(physics::inertia(scene_.body, state.x, below) * way);
-  return way.dot(physics::angular_momentum(scene_.body, state.x, state.v, below));
-}
-
 void RollBrace::follow(const RigidFit& fit, const physics::State& reference, const physics::State& state, double time_s, double seconds) {
   if (!is_needed()) return;
   const Eigen::Matrix3d meant(Eigen::AngleAxisd(turn_per_s_ * time_s, Eigen::Vector3d::UnitY())), turned = fit.rotation * meant;
   const Eigen::Vector3d up = turned.col(1), left = level_left_of(turned * along_);
   const double before = roll_;
   roll_ = std::atan2(left.dot(up), up.y());
-  double inertia = 0, meant_inertia = 0;
-  const double momentum = rolling(state, left, inertia) - rolling(reference, level_left_of(meant * along_), meant_inertia);
-  const double of_trunk = std::remainder(roll_ - before, 2 * M_PI) / seconds, of_all = inertia > 0 ? -momentum / inertia : 0;
+  const double momentum = rolling_momentum(scene_, state, left) - rolling_momentum(scene_, reference, level_left_of(meant * along_));
+  const double inertia = rolling_inertia(scene_, state, left);
+  const double of_all = inertia > 0 ? -momentum / inertia : 0, of_trunk = std::remainder(roll_ - before, 2 * M_PI) / seconds;
   const double rate = kTrunk * of_trunk + (1 - kTrunk) * of_all;
   const double wanted = -(kByRoll * roll_ + kByRate * swing_s_ * rate);
   const double most = std::clamp(std::abs(wanted) - kIdle, 0.0, kMost);

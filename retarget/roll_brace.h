@@ -35,8 +35,6 @@ class RollBrace {
   double roll() const { return roll_; }
 
  private:
-  double rolling(const physics::State& state, const Eigen::Vector3d& left, double& inertia) const;
-
   const physics::Scene& scene_;
   double turn_per_s_ = 0;       // [rad/s] of the target, about y
   double swing_s_ = 0;          // sqrt(height / g)

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 #include <random>
 #include <string>
@@ -171,13 +170,8 @@ TEST(RollBrace, BendsBetweenTheGroundAndItsOwnPlaneWhateverItsHeading) {
   }
 }
 
-/// [rad], of a log that was pushed from the side.
-struct Rolled {
-  double in_a_second = 0;
-  double rocks = 0;  // by how much from side to side, in the third second
-};
-
-Rolled rolled(double speed, bool is_braced) {
+/// How far [rad] a log has rolled that was pushed from the side with `speed` [m/s], after a second.
+double rolled(double speed, bool is_braced) {
   const physics::Scene& scene = the_log();
   const physics::Body& body = scene.body;
   const PreparedTarget plan = lying(body, ContactState::kSlide);
@@ -186,36 +180,27 @@ Rolled rolled(double speed, bool is_braced) {
   physics::State state = physics::laid_down(scene);
   const auto stepper = physics::make_stepper(physics::Method::kExplicit, scene);
   physics::Impulses impulses = physics::make_impulses(scene);
-  double roll = 0, before = 0, least = 1e300, most = -1e300;
-  Rolled result;
-  for (int k = 0; k < 420; ++k) {
+  double roll = 0, before = 0;
+  for (int k = 0; k < 180; ++k) {
     if (k == 60) state.v.row(2).array() += speed;
     const RigidFit fit = best_rigid_fit(body.rest, state.x, shares);
     brace.follow(fit, at_rest(), state, 0, kStep);
     roll += std::remainder(brace.roll() - before, 2 * M_PI);
     before = brace.roll();
-    if (k < 180) result.in_a_second = std::abs(roll);
-    if (k >= 300) {
-      least = std::min(least, roll);
-      most = std::max(most, roll);
-    }
     Eigen::VectorXd activation = Eigen::VectorXd::Ones(body.edge_count());
     if (is_braced) brace.apply(activation);
     for (int s = 0; s < 2; ++s) {
-      if (stepper->step(kStep / 2, activation, nullptr, state, impulses) == physics::Termination::kDiverged) return {std::nan(""), std::nan("")};
+      if (stepper->step(kStep / 2, activation, nullptr, state, impulses) == physics::Termination::kDiverged) return std::nan("");
     }
   }
-  result.rocks = most - least;
-  return result;
+  return std::abs(roll);
 }
 
-TEST(RollBrace, ALogThatIsPushedFromTheSideRollsOnUnlessItBendsAndThenComesToRest) {
+TEST(RollBrace, ALogThatIsPushedFromTheSideRollsOnUnlessItBends) {
   for (const double speed : {-1.2, -1.0, -0.8, -0.6, 0.6, 0.8, 1.0, 1.2}) {
     SCOPED_TRACE(speed);
-    EXPECT_GT(rolled(speed, false).in_a_second, 2);
-    const Rolled braced = rolled(speed, true);
-    EXPECT_LT(braced.in_a_second, 0.4);
-    EXPECT_LT(braced.rocks, 0.05);
+    EXPECT_GT(rolled(speed, false), 2);
+    EXPECT_LT(rolled(speed, true), 0.4);
   }
 }
 

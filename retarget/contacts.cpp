@@ -73,6 +73,91 @@ struct PatchSight {
 };
 using Sights = std::vector<std::vector<PatchSight>>;  // patches x F
 
+/// A bone's contact points as label_contacts sees them.
+struct Sighted {
+  std::vector<PatchSight> sights;
+  std::vector<ContactState> states;
+  Eigen::MatrixXd direction;  // 2 x F, of sliding
+};
+
+/// Within which a patch touches: below `reach` [m], `hysteresis` times that while it does; slower than `still` sideways it sticks, faster
+/// than `fall` up or down it does not touch [m/s].
+struct Limits {
+  double reach, hysteresis, still, fall;
+};
+
+/// `neighbours` are the points' frames with one more at either end.
+Sighted look_at(const Motion& points, const Eigen::MatrixXd& neighbours, const std::vector<int>& members, const Limits& limits) {
+  const Eigen::Index frames = points.count();
+  Sighted seen;
+  seen.sights.resize(static_cast<std::size_t>(frames));
+  seen.states.assign(static_cast<std::size_t>(frames), ContactState::kOff);
+  seen.direction = Eigen::MatrixXd::Zero(2, frames);
+  ContactState previous = ContactState::kOff;
+  for (int pass = 0; pass < (points.loop ? 2 : 1); ++pass) {  // twice round a loop, so that the seam has a history
+    for (Eigen::Index f = 0; f < frames; ++f) {
+      const auto x = points.at(f);
+      double lowest = 1e300;
+      for (const int p : members) lowest = std::min(lowest, x(1, p));
+      // Speeds of the low points towards the frame before and the one after: the first and last frame of a stance stand
+      // still on one side.
+      Eigen::Vector3d before = Eigen::Vector3d::Zero(), after = before;
+      int low = 0;
+      for (const int p : members) {
+        if (x(1, p) > lowest + 0.3 * limits.reach) continue;
+        before += (neighbours.col(f + 1) - neighbours.col(f)).segment<3>(3 * p) * points.rate_hz;
+        after += (neighbours.col(f + 2) - neighbours.col(f + 1)).segment<3>(3 * p) * points.rate_hz;
+        ++low;
+      }
+      const Eigen::Vector3d velocity = (before.norm() < after.norm() ? before : after) / low;
+      const double ease = previous == ContactState::kOff ? 1 : limits.hysteresis;
+      const double sideways = std::hypot(velocity.x(), velocity.z());
+      ContactState state = ContactState::kOff;
+      if (lowest < limits.reach * ease && std::abs(velocity.y()) < limits.fall) {
+        state = sideways < limits.still ? ContactState::kStick : ContactState::kSlide;
+      }
+      if (sideways > 0) seen.direction.col(f) = Eigen::Vector2d(velocity.x(), velocity.z()) / sideways;
+      seen.states[static_cast<std::size_t>(f)] = previous = state;
+      seen.sights[static_cast<std::size_t>(f)] = {lowest, sideways, std::abs(velocity.y())};
+    }
+  }
+  return seen;
+}
+
+/// A foot that brushes the ground on its way through is not dragged, and one that glides for a moment in its stance stands: sliding counts
+/// if it lasts. What is dragged and slow for a moment does not stand: between slides, standing counts if it lasts.
+void settle(int least_frames, bool loop, std::vector<ContactState>& states) {
+  const int least_run = 2 * least_frames + 1;
+  replace_runs(states, ContactState::kSlide, least_run, loop, [](ContactState before, ContactState after) {
+    return before == ContactState::kStick && after == ContactState::kStick ? ContactState::kStick : ContactState::kOff;
+  });
+  replace_runs(states, ContactState::kStick, least_run, loop, [](ContactState before, ContactState after) {
+    return before == ContactState::kSlide && after == ContactState::kSlide ? ContactState::kSlide : ContactState::kStick;
+  });
+  close_short_runs(states, least_frames, loop);
+}
+
+/// Whether two bones rise and sink together: their heights differ by less than half of what they deviate from their mean, as those of equal
+/// swings do up to 30 degrees of phase. What hardly moves may differ by half of `reach` [m].
+bool are_in_phase(const std::vector<PatchSight>& one, const std::vector<PatchSight>& other, double reach) {
+  const double frames = static_cast<double>(one.size());
+  double middle = 0, apart = 0, swing = 0;
+  for (std::size_t f = 0; f < one.size(); ++f) middle += 0.5 * (one[f].height + other[f].height) / frames;
+  for (std::size_t f = 0; f < one.size(); ++f) {
+    apart += std::abs(one[f].height - other[f].height) / frames;
+    swing += std::abs(0.5 * (one[f].height + other[f].height) - middle) / frames;
+  }
+  return apart < 0.5 * std::max(swing, reach);
+}
+
+/// What holds goes before what is dragged, and that before what is away.
+ContactState firmer(ContactState a, ContactState b) {
+  for (const ContactState state : {ContactState::kStick, ContactState::kSlide}) {
+    if (a == state || b == state) return state;
+  }
+  return ContactState::kOff;
+}
+
 /// What a patch must keep within to bear a body that has nothing else to stand on.
 struct BearingLimits {
   double height = 0, upward = 0, sideways = 0;  // [m], [m/s]; what is faster sideways slides
@@ -160,7 +245,7 @@ Motion point_motion(const physics::ContactPoints& points, const Motion& nodes) {
 
 ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bone_of_point,
                                const std::vector<std::string>& bone_names, double length, double size,
-                               const ContactOptions& options) {
+                               const ContactOptions& options, const std::vector<std::array<int, 2>>& mirrored) {
   const Eigen::Index frames = points.count();
   const Eigen::MatrixXd speed = velocities(points), neighbours = padded_frames(points, 1);
   const double reach = options.height * size;
@@ -174,62 +259,31 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
   const double still = std::max(options.least_still_speed * wave, options.still_speed * rms_speed);
   const double fall = options.fall_speed * wave;
 
+  const Limits limits{reach, options.hysteresis, still, fall};
   std::map<int, std::vector<int>> points_of_bone;
   for (std::size_t p = 0; p < bone_of_point.size(); ++p) points_of_bone[bone_of_point[p]].push_back(static_cast<int>(p));
+  std::map<int, Sighted> sighted;
+  for (const auto& [bone, members] : points_of_bone) {
+    sighted[bone] = look_at(points, neighbours, members, limits);
+    settle(options.least_frames, points.loop, sighted[bone].states);
+  }
+  for (const auto& [left, right] : mirrored) {
+    Sighted &one = sighted.at(left), &other = sighted.at(right);
+    if (!are_in_phase(one.sights, other.sights, reach)) continue;
+    for (std::size_t f = 0; f < one.states.size(); ++f) one.states[f] = other.states[f] = firmer(one.states[f], other.states[f]);
+  }
 
   ContactSchedule schedule;
   schedule.touching = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(
       static_cast<Eigen::Index>(bone_of_point.size()), frames, false);
   std::vector<Eigen::MatrixXd> directions;
   Sights sights;
-  for (const auto& [bone, members] : points_of_bone) {
-    std::vector<PatchSight> sight(static_cast<std::size_t>(frames));
-    std::vector<ContactState> states(static_cast<std::size_t>(frames), ContactState::kOff);
-    Eigen::MatrixXd direction = Eigen::MatrixXd::Zero(2, frames);
-    ContactState previous = ContactState::kOff;
-    for (int pass = 0; pass < (points.loop ? 2 : 1); ++pass) {  // twice round a loop, so that the seam has a history
-      for (Eigen::Index f = 0; f < frames; ++f) {
-        const auto x = points.at(f);
-        double lowest = 1e300;
-        for (const int p : members) lowest = std::min(lowest, x(1, p));
-        // Speeds of the low points towards the frame before and the one after: the first and last frame of a stance stand
-        // still on one side.
-        Eigen::Vector3d before = Eigen::Vector3d::Zero(), after = before;
-        int low = 0;
-        for (const int p : members) {
-          if (x(1, p) > lowest + 0.3 * reach) continue;
-          before += (neighbours.col(f + 1) - neighbours.col(f)).segment<3>(3 * p) * points.rate_hz;
-          after += (neighbours.col(f + 2) - neighbours.col(f + 1)).segment<3>(3 * p) * points.rate_hz;
-          ++low;
-        }
-        const Eigen::Vector3d velocity = (before.norm() < after.norm() ? before : after) / low;
-        const double ease = previous == ContactState::kOff ? 1 : options.hysteresis;
-        const double sideways = std::hypot(velocity.x(), velocity.z());
-        ContactState state = ContactState::kOff;
-        if (lowest < reach * ease && std::abs(velocity.y()) < fall) {
-          state = sideways < still ? ContactState::kStick : ContactState::kSlide;
-        }
-        if (sideways > 0) direction.col(f) = Eigen::Vector2d(velocity.x(), velocity.z()) / sideways;
-        states[static_cast<std::size_t>(f)] = previous = state;
-        sight[static_cast<std::size_t>(f)] = {lowest, sideways, std::abs(velocity.y())};
-      }
-    }
-    // A foot that brushes the ground on its way through is not dragged, and one that glides for a moment in its stance
-    // stands: sliding counts if it lasts. What is dragged and slow for a moment does not stand: between slides, standing
-    // counts if it lasts.
-    const int least_run = 2 * options.least_frames + 1;
-    replace_runs(states, ContactState::kSlide, least_run, points.loop, [](ContactState before, ContactState after) {
-      return before == ContactState::kStick && after == ContactState::kStick ? ContactState::kStick : ContactState::kOff;
-    });
-    replace_runs(states, ContactState::kStick, least_run, points.loop, [](ContactState before, ContactState after) {
-      return before == ContactState::kSlide && after == ContactState::kSlide ? ContactState::kSlide : ContactState::kStick;
-    });
-    close_short_runs(states, options.least_frames, points.loop);
-    if (std::all_of(states.begin(), states.end(), [](ContactState s) { return s == ContactState::kOff; })) continue;
-    schedule.patches.push_back({bone_names[static_cast<std::size_t>(bone)], members});
-    schedule.state.push_back(states);
-    directions.push_back(direction);
-    sights.push_back(std::move(sight));
+  for (auto& [bone, seen] : sighted) {
+    if (std::all_of(seen.states.begin(), seen.states.end(), [](ContactState s) { return s == ContactState::kOff; })) continue;
+    schedule.patches.push_back({bone_names[static_cast<std::size_t>(bone)], points_of_bone.at(bone)});
+    schedule.state.push_back(std::move(seen.states));
+    directions.push_back(std::move(seen.direction));
+    sights.push_back(std::move(seen.sights));
   }
   Eigen::VectorXd middle(frames);
   for (Eigen::Index f = 0; f < frames; ++f) middle[f] = points.at(f).row(1).mean();

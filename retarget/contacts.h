@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -45,9 +46,12 @@ struct ContactOptions {
 /// Labels for the points' motion (height above the ground y = 0). Frames without contact in which the points' mean height does
 /// not fall freely are no flight: the lowest and slowest patch bears there, see support_height. `bone_of_point` names each point's patch.
 /// length [m] is L, size [m] is D.
+///
+/// Of each pair of `mirrored` bones (mirror.h) that rise and sink together, as the hind legs of what hops, both touch where
+/// either does. What hovers near a limit else touches on one side alone, and a leap with one shin down turns.
 ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bone_of_point,
                                const std::vector<std::string>& bone_names, double length, double size,
-                               const ContactOptions& options);
+                               const ContactOptions& options, const std::vector<std::array<int, 2>>& mirrored = {});
 
 /// Height [m] of the ground under a motion: the level on which its lowest points rest, the 20th percentile over the frames
 /// of the lowest point.

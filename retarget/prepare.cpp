@@ -10,6 +10,7 @@
 #include "retarget/balance.h"
 #include "retarget/leaps.h"
 #include "retarget/let_go.h"
+#include "retarget/mirror.h"
 #include "retarget/needed_strain.h"
 #include "retarget/shape_projection.h"
 #include "retarget/smooth.h"
@@ -47,10 +48,13 @@ ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, co
                                 const std::vector<std::string>& bone_names, double length, double size, const PrepareOptions& options) {
   std::vector<ContactSchedule> schedules;
   std::vector<double> badness;
+  Eigen::Matrix3Xd rest(3, scene.contact_points.count());
+  for (int p = 0; p < scene.contact_points.count(); ++p) rest.col(p) = scene.contact_points.of(scene.body.rest, p);
+  const std::vector<std::array<int, 2>> mirrored = mirrored_bones(rest, patch_bone, length);
   for (const double factor : {1.0, 2.0, 3.5, 5.0}) {
     ContactOptions contact_options = options.contacts;
     contact_options.height *= factor;
-    schedules.push_back(label_contacts(points, patch_bone, bone_names, length, size, contact_options));
+    schedules.push_back(label_contacts(points, patch_bone, bone_names, length, size, contact_options, mirrored));
     badness.push_back(find_shift(grounded, scene, schedules.back(), length, options.support_friction, 12).badness);
     if (badness.back() < kGoodBalance) break;
   }

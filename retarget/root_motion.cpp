@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "retarget/leap_pace.h"
+#include "retarget/mirror.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -84,7 +85,11 @@ RootMotionResult recover_root_motion(const Motion& points, const Motion& com, do
   }
   const Eigen::VectorXd bearing = bearing_of(heights, soft);
   const bool leaping = points.loop && leaps(bearing, com);
-  if (leaping) ground = leaping_pace(ground, bearing, com, length);
+  if (leaping) {
+    ground = leaping_pace(ground, bearing, com, length);
+    // Else the way leans to the side whose points are a little lower.
+    if (const std::optional<int> across = mirror_axis(points, length)) ground.row(*across / 2).setZero();
+  }
   const Eigen::Vector2d mean = ground.rowwise().mean();
   if (mode == RootMotion::kAuto && mean.norm() * points.duration_s() < 0.1 * length) return result;
   if (points.loop && !leaping) ground = smooth_pace(ground, bearing);

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <vector>
 
 namespace hydrostat::retarget::contacts_test {
 namespace {
@@ -154,6 +156,47 @@ TEST(LabelContacts, AFootThatGlidesForAMomentInItsStanceStands) {
     return Eigen::Vector2d(0.02 * static_cast<double>(std::clamp<Eigen::Index>(f - 30, 0, 6)), f < 55 ? 0 : 0.2);
   }));
   for (std::size_t f = 2; f < 53; ++f) EXPECT_EQ(contacts.state[0][f], kStick) << "frame " << f;
+}
+
+/// Feet 1 and 2, left and right of a head: down for half of a loop and then in an arc, the right one `higher` [m] all the while and
+/// `lag` frames behind.
+Motion head_and_two_feet(double higher, Eigen::Index lag) {
+  Motion motion;
+  motion.loop = true;
+  motion.frames = Eigen::MatrixXd::Zero(9, kFrames);
+  const auto rise = [](Eigen::Index f) { return f < 30 ? 0 : 0.2 * std::sin(M_PI * static_cast<double>(f - 30) / 30); };
+  for (Eigen::Index f = 0; f < kFrames; ++f) {
+    motion.at(f).col(0) << 0, 0.5 + 0.2 * std::sin(2 * M_PI * static_cast<double>(f) / kFrames), 0;
+    motion.at(f).col(1) << -0.1, rise(f), 0;
+    motion.at(f).col(2) << 0.1, higher + rise((f + kFrames - lag) % kFrames), 0;
+  }
+  return motion;
+}
+
+ContactSchedule label_two_feet(const Motion& motion, const std::vector<std::array<int, 2>>& mirrored) {
+  return label_contacts(motion, {0, 1, 2}, {"head", "left", "right"}, kLength, kSize, {}, mirrored);
+}
+
+TEST(LabelContacts, MirroredFeetThatRiseTogetherTouchTogether) {
+  for (const double higher : {0.008, 0.011, 0.013, 0.016, 0.02}) {  // a patch touches below 12 mm
+    SCOPED_TRACE("higher by " + std::to_string(higher));
+    const Motion hop = head_and_two_feet(higher, 0);
+    const ContactSchedule alone = label_two_feet(hop, {}), together = label_two_feet(hop, {{1, 2}});
+    ASSERT_EQ(together.patches.size(), 2u);
+    EXPECT_TRUE(together.state[0] == alone.state[0]);
+    EXPECT_TRUE(together.state[1] == alone.state[0]);
+    EXPECT_EQ(alone.patches.size(), higher < 0.012 ? 2u : 1u) << "else it tests nothing";
+  }
+}
+
+TEST(LabelContacts, MirroredFeetThatTakeTurnsTouchByThemselves) {
+  for (const Eigen::Index lag : {10, 15, 30, 45}) {
+    SCOPED_TRACE("behind by " + std::to_string(lag));
+    const Motion walk = head_and_two_feet(0.004, lag);
+    const ContactSchedule alone = label_two_feet(walk, {}), pair = label_two_feet(walk, {{1, 2}});
+    EXPECT_TRUE(pair.state == alone.state);
+    EXPECT_FALSE(pair.state[0] == pair.state[1]);
+  }
 }
 
 TEST(GroundHeight, IsTheLevelOfTheLowestPoints) {

@@ -130,6 +130,25 @@ TEST(RecoverRootMotion, AHopGoesOnEvenlyInTheAir) {
   }
 }
 
+TEST(RecoverRootMotion, AHopOfAMirrorImageGoesStraight) {
+  for (const double lower : {-0.02, -0.01, 0.005, 0.01, 0.02}) {
+    SCOPED_TRACE("one foot lower by " + std::to_string(lower));  // [m], and both slide apart in every stance
+    Motion motion = hop(1, 24);
+    for (Eigen::Index f = 0; f < kFrames; ++f) {
+      const double spread = 0.05 * (f < 24 ? static_cast<double>(f) / 12 - 1 : std::cos(M_PI * static_cast<double>(f - 24) / 24));
+      motion.at(f).col(0) += Eigen::Vector3d(0, -lower, -spread);
+      motion.at(f).col(1) += Eigen::Vector3d(0, 0, spread);
+    }
+    Motion com = motion;
+    com.frames = motion.frames.bottomRows(3);
+    const RootMotionResult result = recover_root_motion(motion, com, 1, RootMotion::kAuto);
+    ASSERT_TRUE(result.recovered);
+    EXPECT_EQ(result.travel.z(), 0);
+    EXPECT_EQ(result.offset.row(2).norm(), 0);
+    EXPECT_GT(result.travel.x(), 0.1);
+  }
+}
+
 TEST(RecoverRootMotion, AHopOnTheSpotStaysThere) {
   EXPECT_FALSE(recovered_hop(0, RootMotion::kAuto).recovered);
   EXPECT_LT(recovered_hop(0, RootMotion::kFromFeet).travel.norm(), 0.1);

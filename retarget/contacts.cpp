@@ -267,7 +267,12 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
     sighted[bone] = look_at(points, neighbours, members, limits);
     settle(options.least_frames, points.loop, sighted[bone].states);
   }
+  const bool drags = std::any_of(sighted.begin(), sighted.end(), [](const auto& seen) {
+    const std::vector<ContactState>& states = seen.second.states;
+    return std::find(states.begin(), states.end(), ContactState::kSlide) != states.end();
+  });
   for (const auto& [left, right] : mirrored) {
+    if (drags) break;  // no legs: the two ends of a worm are no pair
     Sighted &one = sighted.at(left), &other = sighted.at(right);
     if (!are_in_phase(one.sights, other.sights, reach)) continue;
     for (std::size_t f = 0; f < one.states.size(); ++f) one.states[f] = other.states[f] = firmer(one.states[f], other.states[f]);

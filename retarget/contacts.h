@@ -48,7 +48,8 @@ struct ContactOptions {
 /// length [m] is L, size [m] is D.
 ///
 /// Of each pair of `mirrored` bones (mirror.h) that rise and sink together, as the hind legs of what hops, both touch where
-/// either does. What hovers near a limit else touches on one side alone, and a leap with one shin down turns.
+/// either does. What hovers near a limit else touches on one side alone, and a leap with one shin down turns. What
+/// drags anything over the ground is left alone.
 ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bone_of_point,
                                const std::vector<std::string>& bone_names, double length, double size,
                                const ContactOptions& options, const std::vector<std::array<int, 2>>& mirrored = {});

@@ -7,8 +7,8 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kOffImage = 0.05;        // of L: further off in the mean is no mirror image
-constexpr double kMovesOffImage = 0.02;   // likewise of what moves, RMS
+constexpr double kOffImage = 0.05;       // of L: further off in the mean is no mirror image
+constexpr double kMovesOffImage = 0.02;  // likewise of what moves, RMS
 
 /// Mean distance [m] of the points of a to the nearest of b.
 double mean_distance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {

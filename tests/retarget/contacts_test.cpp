@@ -189,6 +189,15 @@ TEST(LabelContacts, MirroredFeetThatRiseTogetherTouchTogether) {
   }
 }
 
+TEST(LabelContacts, MirroredEndsOfWhatDragsItselfTouchByThemselves) {
+  Motion crawl = head_and_two_feet(0.013, 0);
+  for (Eigen::Index f = 0; f < kFrames; ++f) crawl.at(f).col(1).x() += 0.02 * static_cast<double>(f < 30 ? f : 60 - f);
+  const ContactSchedule alone = label_two_feet(crawl, {}), pair = label_two_feet(crawl, {{1, 2}});
+  ASSERT_TRUE(is_dragged(alone));
+  EXPECT_TRUE(pair.state == alone.state);
+  EXPECT_EQ(pair.patches.size(), 1u) << "the higher one never touches";
+}
+
 TEST(LabelContacts, MirroredFeetThatTakeTurnsTouchByThemselves) {
   for (const Eigen::Index lag : {10, 15, 30, 45}) {
     SCOPED_TRACE("behind by " + std::to_string(lag));

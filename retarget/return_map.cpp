@@ -1,6 +1,5 @@
 #include "retarget/return_map.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -16,13 +15,17 @@ constexpr int kCyclesAhead = 4;         // over which errors count
 constexpr double kTrial = 0.005;        // activation of a handle while a model is asked; four times that answers four times
 constexpr double kMost = 0.03;          // activation of a handle
 constexpr double kEffort = 0.6;         // per activation of a handle, where errors count per L
+constexpr double kChange = 1;           // the same of how it changes from cycle to cycle: calms those that are hardly answered
 constexpr double kLeastDrift = 0.003;   // per L, a cycle: less is left alone
 constexpr double kLeastOnLegs = 0.015;  // the same of what steps freely, for its corrector holds the way but on slopes
 constexpr double kThrown = 0.15;        // the same: what goes further astray falls or was pushed, and bends do not bring it back
 constexpr double kNews = 0.5;           // share of what a cycle did beyond what was foreseen that counts as drift
-constexpr double kSurprise = 0.05;  // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
+constexpr double kSurprise = 0.05;        // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
 constexpr double kSurpriseOfLeap = 0.15;  // of a stride, where that is more: a leap's heading shows where it lands
-constexpr double kAstray = 0.3;     // per L, of a model's cycle
+constexpr double kHolds = 0.5;            // of what the handles were to do, where that is more: what holds by half steers
+constexpr double kForeseen = 0.5;         // of such a surprise: handles that bring less let their bound
+constexpr double kRegrowth = 1.2;         // grow by this factor, up to what it was
+constexpr double kAstray = 0.3;           // per L, of a model's cycle
 
 /// An error of the way in lengths per L: a turn counts by how far it takes the ends of a body of length L.
 Eigen::Vector3d per_length(const WayError& error, double length) {
@@ -58,6 +61,20 @@ Eigen::Matrix3d without_way(const Eigen::Vector3d& stride) {
   return Eigen::Matrix3d::Identity() - way * way.transpose() / way.squaredNorm();
 }
 
+/// The h of least h' normal h / 2 + pull' h without an entry beyond most, by coordinate descent, which converges for a positive definite
+/// normal. To shrink the best h of all to the bound instead would idle strong handles where weak ones would do it, had they no bound.
+ReturnMap::Handles least_within(const Eigen::MatrixXd& normal, const Eigen::VectorXd& pull, double most) {
+  constexpr int kSweeps = 20000;
+  ReturnMap::Handles h = ReturnMap::Handles::Zero(), before;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    before = h;
+    for (int k = 0; k < ReturnMap::kHandles; ++k)
+      h[k] = std::clamp(h[k] - (normal.row(k).dot(h) + pull[k]) / normal(k, k), -most, most);
+    if ((h - before).cwiseAbs().maxCoeff() <= 1e-12 * most) break;
+  }
+  return h;
+}
+
 Eigen::Matrix3d turned(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix(); }
 
 }  // namespace
@@ -90,15 +107,17 @@ WayError ReturnMap::way_error(const RigidFit& fit, long cycles) const {
 
 void ReturnMap::end_cycle(const WayError& error) {
   if (!is_loop_) return;
-  const WayError news = error - (onward_ * error_ + drift_ + response_ * handles_);
+  const WayError effect = response_ * handles_, news = error - (onward_ * error_ + drift_ + effect);
+  const double most_surprise = std::max(most_surprise_, kHolds * per_length(effect, length_).norm());
   const double surprise = per_length(news, length_).norm();
   error_ = error;
   if (!has_learned_) {
     is_drifting_ = surprise > least_drift_ && surprise < kThrown;
-  } else if (surprise > most_surprise_) {
+  } else if (surprise > most_surprise) {
     handles_.setZero();
     most_ /= 2;
   } else {
+    if (!handles_.isZero(0) && surprise < kForeseen * most_surprise) most_ = std::min(kRegrowth * most_, kMost);
     drift_ += kNews * news;
     steer();
   }
@@ -126,8 +145,8 @@ void ReturnMap::learn(const Answers& errors) {
 void ReturnMap::steer() {
   Eigen::Matrix<double, 3, kHandles> reach = response_;
   WayError left = onward_ * error_ + drift_;
-  Eigen::MatrixXd normal = kEffort * kEffort * Eigen::MatrixXd::Identity(kHandles, kHandles);
-  Eigen::VectorXd pull = Eigen::VectorXd::Zero(kHandles);
+  Eigen::MatrixXd normal = (kEffort * kEffort + kChange * kChange) * Eigen::MatrixXd::Identity(kHandles, kHandles);
+  Eigen::VectorXd pull = -kChange * kChange * handles_;
   for (int k = 0; k < kCyclesAhead; ++k) {
     Eigen::Matrix<double, 3, kHandles> rows;
     for (int h = 0; h < kHandles; ++h) rows.col(h) = counted_ * per_length(reach.col(h), length_);
@@ -136,8 +155,7 @@ void ReturnMap::steer() {
     reach = onward_ * reach;
     left = onward_ * left;
   }
-  handles_ = -normal.ldlt().solve(pull);
-  handles_ *= most_ / std::max(handles_.cwiseAbs().maxCoeff(), most_);
+  handles_ = least_within(normal, pull, most_);
 }
 
 void ReturnMap::apply(double time_s, Eigen::VectorXd& activation) const {

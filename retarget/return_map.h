@@ -15,7 +15,9 @@ using WayError = Eigen::Vector3d;
 /// bend the body sideways, as a whole and the ends against each other, each with a time course that is zero where a cycle
 /// begins and ends. How a handle turns and moves a body that slides is not known from its build: it is measured, with a
 /// cycle of a model's free motion for each of them. From then on every cycle's handles are those that leave the least of the
-/// error over the cycles ahead, by damped least squares; what turns the body anew in every cycle is estimated with it.
+/// error over the cycles ahead, by damped least squares within their bound; what turns the body anew in every cycle is estimated with it.
+/// After a cycle that went otherwise than foreseen, by more than half of what the handles were to do, they rest for one and their bound is
+/// halved; it grows again while they do what they are to.
 /// Source: Laszlo, van de Panne, Fiume, "Limit Cycle Control and its Application to the Animation of Balancing and Walking",
 /// SIGGRAPH 1996: the response of a cycle by finite differences, and its inverse once a cycle. The estimate of the drift and
 /// the cycles ahead are ours.

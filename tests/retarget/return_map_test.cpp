@@ -105,6 +105,75 @@ TEST(ReturnMap, KeepsABodyOnItsWayThatWouldDriftFromItEvenIfItAnswersOtherwiseTh
   }
 }
 
+/// As a frog answers: two handles turn it, each within its bound by up to 0.14 rad a cycle, and set it aside; four hardly do, but could
+/// keep both its heading and its place, were they not bounded. It drifts by `turn` [rad] a cycle.
+Plant strong_and_weak_plant(unsigned seed, double turn, double stride) {
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> even(0.8, 1.2);
+  Plant plant;
+  plant.stride = stride;
+  plant.response.row(0) << 4.8, -1.3, 4.4, -0.4, 0.0, -0.4;
+  if (stride > 0) plant.response.row(2) << 1.7, -0.3, 1.6, 0.1, 0.1, 0.1;
+  plant.response.row(2) *= kLength;
+  for (double& entry : plant.response.reshaped()) entry *= even(generator);
+  plant.drift[0] = turn;
+  return plant;
+}
+
+/// The largest error of the cycles from 20 on, of 40; handles were at rest in so many from the second on.
+struct Course {
+  double late = 0;
+  int rests = 0;
+};
+
+/// The plant after it has answered; `share` of its response holds. A push turns it by 0.6 rad in the third cycle, or does not.
+Course steered(Plant plant, const PreparedTarget& plan, double share, bool is_pushed) {
+  Course course;
+  ReturnMap map(plan, kLength, make_box_creature().scene.body);
+  const ReturnMap::Answers answers = plant.answers();
+  plant.response *= share;
+  for (int cycle = 0; cycle < 40; ++cycle) {
+    plant.go(map.handles());
+    if (is_pushed && cycle == 2) plant.error[0] += 0.6;
+    map.end_cycle(plant.error);
+    if (cycle == 0) map.learn(answers);
+    course.rests += map.handles().isZero(0);
+    if (cycle >= 20) course.late = std::max(course.late, length_of(plant.error));
+  }
+  return course;
+}
+
+TEST(ReturnMap, StrongHandlesDoWhatWeakOnesCouldNotWithinTheirBound) {
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    for (const double turn : {-0.12, 0.12}) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + " turn " + std::to_string(turn));
+      EXPECT_LT(steered(strong_and_weak_plant(seed, turn, 2 * kLength), striding(/*leaps=*/true), 1, false).late, 0.1);
+    }
+  }
+}
+
+TEST(ReturnMap, SteersOnByAResponseThatHoldsByHalf) {
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    for (const double turn : {-0.2, 0.2}) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + " turn " + std::to_string(turn));
+      Plant plant = strong_and_weak_plant(seed, turn, 0);
+      plant.response.row(0) *= 2;
+      const Course course = steered(plant, going(ContactState::kSlide), 0.6, false);
+      EXPECT_EQ(course.rests, 0);
+      EXPECT_LT(course.late, 0.02);
+    }
+  }
+}
+
+TEST(ReturnMap, RecoversItsBoundAfterAPush) {
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Course course = steered(strong_and_weak_plant(seed, 0.2, 0), going(ContactState::kSlide), 1, true);
+    EXPECT_EQ(course.rests, 1);
+    EXPECT_LT(course.late, 0.02);
+  }
+}
+
 TEST(ReturnMap, LeavesAloneWhatIsOnItsWayWasThrownOrIsPlayedOnceAndLegsThatLoseLittle) {
   const physics::Body body = make_box_creature().scene.body;
   const auto wants = [&](const PreparedTarget& plan, const WayError& error) {

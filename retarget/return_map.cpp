@@ -23,8 +23,8 @@ constexpr double kNews = 0.5;           // share of what a cycle did beyond what
 constexpr double kSurprise = 0.05;        // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
 constexpr double kSurpriseOfLeap = 0.15;  // of a stride, where that is more: a leap's heading shows where it lands
 constexpr double kHolds = 0.5;            // of what the handles were to do, where that is more: what holds by half steers
-constexpr double kForeseen = 0.5;         // of such a surprise: handles that bring less let their bound
-constexpr double kRegrowth = 1.2;         // grow by this factor, up to what it was
+constexpr double kForeseen = 0.5;         // of what would be a surprise: less is as foreseen
+constexpr double kRegrowth = 1.2;         // factor by which the handles' bound grows again after a cycle as foreseen
 constexpr double kAstray = 0.3;           // per L, of a model's cycle
 
 /// An error of the way in lengths per L: a turn counts by how far it takes the ends of a body of length L.
@@ -85,7 +85,7 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
       yaw_(plan.target.yaw),
       least_drift_(is_dragged(plan.contacts) ? kLeastDrift : kLeastOnLegs),
       most_(kMost),
-      most_surprise_(kSurprise),
+      least_surprise_(kSurprise),
       is_loop_(plan.target.loop) {
   response_.setZero();
   if (!is_loop_) return;
@@ -94,7 +94,7 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
   const Eigen::Matrix3d back = turned(-yaw_);
   const Eigen::Vector3d aside = back * Eigen::Vector3d::UnitY().cross(stride);  // by a heading of 1 rad
   if (has_flight(plan)) {
-    most_surprise_ = std::max(kSurprise, kSurpriseOfLeap * stride.norm() / length_);
+    least_surprise_ = std::max(kSurprise, kSurpriseOfLeap * stride.norm() / length_);
     counted_ = without_way(stride);
   }
   onward_ << 1, 0, 0, aside.x(), back(0, 0), back(0, 2), aside.z(), back(2, 0), back(2, 2);
@@ -108,16 +108,16 @@ WayError ReturnMap::way_error(const RigidFit& fit, long cycles) const {
 void ReturnMap::end_cycle(const WayError& error) {
   if (!is_loop_) return;
   const WayError effect = response_ * handles_, news = error - (onward_ * error_ + drift_ + effect);
-  const double most_surprise = std::max(most_surprise_, kHolds * per_length(effect, length_).norm());
+  const double allowed = std::max(least_surprise_, kHolds * per_length(effect, length_).norm());
   const double surprise = per_length(news, length_).norm();
   error_ = error;
   if (!has_learned_) {
     is_drifting_ = surprise > least_drift_ && surprise < kThrown;
-  } else if (surprise > most_surprise) {
+  } else if (surprise > allowed) {
     handles_.setZero();
     most_ /= 2;
   } else {
-    if (!handles_.isZero(0) && surprise < kForeseen * most_surprise) most_ = std::min(kRegrowth * most_, kMost);
+    if (!handles_.isZero(0) && surprise < kForeseen * allowed) most_ = std::min(kRegrowth * most_, kMost);
     drift_ += kNews * news;
     steer();
   }

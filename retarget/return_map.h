@@ -16,8 +16,8 @@ using WayError = Eigen::Vector3d;
 /// begins and ends. How a handle turns and moves a body that slides is not known from its build: it is measured, with a
 /// cycle of a model's free motion for each of them. From then on every cycle's handles are those that leave the least of the
 /// error over the cycles ahead, by damped least squares within their bound; what turns the body anew in every cycle is estimated with it.
-/// After a cycle that went otherwise than foreseen, by more than half of what the handles were to do, they rest for one and their bound is
-/// halved; it grows again while they do what they are to.
+/// After a cycle that went otherwise than foreseen, by more than 5 % of L (of what leaps, 15 % of its stride) and more than half of what
+/// the handles were to do, they rest for one and their bound is halved; it grows again while cycles go as foreseen.
 /// Source: Laszlo, van de Panne, Fiume, "Limit Cycle Control and its Application to the Animation of Balancing and Walking",
 /// SIGGRAPH 1996: the response of a cycle by finite differences, and its inverse once a cycle. The estimate of the drift and
 /// the cycles ahead are ours.
@@ -57,7 +57,7 @@ class ReturnMap {
   double yaw_;          // [rad] of the target in a cycle
   double least_drift_;  // per L, a cycle
   double most_;         // of a handle
-  double most_surprise_;  // per L
+  double least_surprise_;  // per L
   bool is_loop_, has_learned_ = false, is_drifting_ = false, was_tried_ = false;
   Eigen::MatrixXd bends_;   // E x 2
   Eigen::Matrix3d counted_ = Eigen::Matrix3d::Identity();  // what of an error is to be made up for

@@ -120,10 +120,9 @@ Plant strong_and_weak_plant(unsigned seed, double turn, double stride) {
   return plant;
 }
 
-/// The largest error of the cycles from 20 on, of 40; handles were at rest in so many from the second on.
 struct Course {
-  double late = 0;
-  int rests = 0;
+  double late = 0;  // per L, the largest error of cycles 20 to 40
+  int rests = 0;    // cycles for which the handles were put to rest
 };
 
 /// The plant after it has answered; `share` of its response holds. A push turns it by 0.6 rad in the third cycle, or does not.

@@ -101,7 +101,7 @@ TEST(PerformSteadily, TakesWhatKeepsUpThePlannedBodyAndMostOfThoseOffThePlan) {
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1.5);
   options.is_thorough = true;
-  options.replay.observation.delay_s = 0.07;
+  options.replay.observation.delay_s = 0.09;
   const auto falls_by = [&](const Feedback& feedback) { return perform_by(feedback, performer, signals, options).main().report.fell; };
   const auto trials_lost_by = [&](const Feedback& feedback) {
     PerformOptions by = options;
@@ -132,7 +132,7 @@ TEST(PerformSteadily, TakesTheFirstGainThatStaysUpWhereItIsNotThorough) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1.5);
-  options.replay.observation.delay_s = 0.07;
+  options.replay.observation.delay_s = 0.09;
   const auto falls_by = [&](const Feedback& feedback) { return perform_by(feedback, performer, signals, options).main().report.fell; };
   const auto is_passed = [&](const Feedback& feedback) { return feedback.regulator > 0 || falls_by(feedback); };
   const Performances steady = perform_steadily(performer, signals, options);
@@ -150,7 +150,7 @@ TEST(CountTrialsLost, IsNoneOfWhatStandsAndAllOfWhatFalls) {
   EXPECT_EQ(count_trials_lost(performer, signals, options), 0);
   options.threads = 1;
   options.feedback = {1, 0.5, 10.0 / 3};
-  options.replay.observation.delay_s = 0.07;
+  options.replay.observation.delay_s = 0.09;
   options.replay.duration_s = 1.5;
   const int lost = count_trials_lost(performer, signals, options);
   EXPECT_EQ(lost, static_cast<int>(kTrials.size()));

@@ -71,6 +71,11 @@ double misfit(double nodes, double mean_fill, const Eigen::Vector3d& cell_size, 
   return count + range + (1 - mean_fill) + 0.3 * std::log(cell_size.maxCoeff() / cell_size.minCoeff());
 }
 
+double lopsidedness(const Eigen::Vector3i& cells, const BodyOptions& options) {
+  constexpr double kThree = 0.9;  // as ill as a third too many or too few nodes
+  return options.mirror_axis && cells[*options.mirror_axis] == 3 ? kThree : 0;
+}
+
 std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const TriangleSoup& closed,
                                              const BodyOptions& options) {
   constexpr double kRoughVoxels = 120;  // along the longest side
@@ -95,7 +100,8 @@ std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const Tria
       const Lattice lattice = fitted_lattice(skin, cells, 1);
       if (lattice.cell_size.maxCoeff() > kLongestCell * lattice.cell_size.minCoeff() * (1 + 1e-9)) continue;
       const auto [nodes, fill] = estimated_body(middles, rough.cell_size.prod(), lattice, options.least_fill);
-      if (nodes > 0) ranked.push_back({misfit(nodes, fill, lattice.cell_size, options), {cells[0], cells[1], cells[2]}});
+      const double score = misfit(nodes, fill, lattice.cell_size, options) + lopsidedness(cells, options);
+      if (nodes > 0) ranked.push_back({score, {cells[0], cells[1], cells[2]}});
       if (nodes > 4 * wanted) along = wanted;  // finer lattices only have more
     }
   }

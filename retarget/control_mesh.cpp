@@ -53,6 +53,7 @@ std::string broken_rule(const BodyOptions& options) {
   if ((options.lattice.array() != 0).any() && (options.lattice.array() < 1).any())
     return "lattice must have at least one cell along each axis";
   if (options.lattice.cast<double>().prod() > 20000) return "lattice must have at most 20000 cells";
+  if (options.mirror_axis && *options.mirror_axis != 0 && *options.mirror_axis != 2) return "mirror_axis must be 0 or 2";
   if (!(options.least_fill >= 0 && options.least_fill <= 0.5)) return "least_fill must be from 0 to 0.5";
   return "";
 }
@@ -70,7 +71,7 @@ ControlMesh build_control_mesh(const Skeleton& skeleton, const SkinnedMesh& skin
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < tries; ++i) {
     ControlMesh mesh = mesh_in_lattice(skeleton, skin, closed, options.least_fill, fitted_lattice(skin, lattices[i], kFine));
-    const double score = misfit(mesh.node_count(), mesh.tet_fill.mean(), mesh.cell_size, options);
+    const double score = misfit(mesh.node_count(), mesh.tet_fill.mean(), mesh.cell_size, options) + lopsidedness(lattices[i], options);
     if (score >= least) continue;
     least = score;
     best = std::move(mesh);

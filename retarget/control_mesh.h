@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 
 #include "retarget/clip.h"
@@ -12,6 +13,7 @@ struct BodyOptions {
   Eigen::Vector3i lattice = Eigen::Vector3i::Zero();  // cells along x, y, z; 0 is chosen by the number of nodes
   double least_fill =
       0.06;  // a part that fills less of its cell, and reaches less far into it [cells], gets no cell: its skin is moved
+  std::optional<int> mirror_axis = std::nullopt;  // 0 or 2: of a body that moves as its own mirror image across it
 };
 
 /// Which value of the options breaks which rule, empty when all is well.
@@ -76,8 +78,10 @@ Embedding embed(const ControlMesh& mesh, const Eigen::Ref<const Eigen::Matrix3Xd
 /// The skin's vertices (bind pose) in the body, each in the copy that its limb belongs to.
 Embedding embed_skin(const ControlMesh& mesh, const SkinnedMesh& skin);
 
-/// A subset of the skin's vertices, lowest first in the bind pose, none nearer to another of its limb than 0.35 of a cell.
-ContactPoints contact_points(const ControlMesh& mesh, const Skeleton& skeleton, const SkinnedMesh& skin);
+/// A subset of the skin's vertices, lowest first in the bind pose, none nearer to another of its limb than 0.35 of a cell. Where
+/// symmetric, what lies as high and as far from the middle is chosen together, so that mirror images have mirror images: these may lie
+/// nearer.
+ContactPoints contact_points(const ControlMesh& mesh, const Skeleton& skeleton, const SkinnedMesh& skin, bool symmetric = false);
 
 /// Positions [m] 3 x P of the embedded points for node positions [m] 3 x N.
 Eigen::Matrix3Xd embedded_positions(const Embedding& embedding, const Eigen::Ref<const Eigen::Matrix3Xd>& nodes);

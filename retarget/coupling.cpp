@@ -9,10 +9,14 @@
 #include <vector>
 
 #include "retarget/error.h"
+#include "retarget/grid.h"
 #include "retarget/morphs.h"
 
 namespace hydrostat::retarget {
 namespace {
+
+constexpr int kMostAnchors = 8;
+using Anchors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMostAnchors>;
 
 /// A node and a bone that owns it.
 struct Hold {
@@ -23,14 +27,24 @@ struct Hold {
 
 struct Rig {
   std::vector<Hold> holds;
-  Eigen::Matrix<double, 3, 4> directions;  // [m] from a node to its anchors, bind pose
-  double anchor_distance;                  // [m]
+  Anchors directions;      // [m] from a node to its anchors, bind pose
+  double anchor_distance;  // [m]
 };
+
+/// The corners of a cube [-1, 1]^3, or every other of them.
+Anchors corners(bool symmetric) {
+  Anchors directions(3, 4);
+  directions << 1, 1, -1, -1, 1, -1, 1, -1, 1, -1, -1, 1;
+  if (!symmetric) return directions;
+  directions.resize(3, kMostAnchors);
+  for (int k = 0; k < kMostAnchors; ++k) directions.col(k) = (2 * corner_step(k).array() - 1).cast<double>();
+  return directions;
+}
 
 Rig hang_on_bones(const ControlMesh& mesh, const CouplingOptions& options) {
   Rig rig;
   rig.anchor_distance = options.anchor_distance * std::cbrt(mesh.cell_size.prod());
-  rig.directions << 1, 1, -1, -1, 1, -1, 1, -1, 1, -1, -1, 1;
+  rig.directions = corners(options.symmetric);
   rig.directions *= rig.anchor_distance / std::sqrt(3.0);
   for (int n = 0; n < mesh.node_count(); ++n) {
     const double least = std::min(options.least_weight, mesh.bone_weights.col(n).maxCoeff());
@@ -46,16 +60,22 @@ Rig hang_on_bones(const ControlMesh& mesh, const CouplingOptions& options) {
   return rig;
 }
 
-/// Four distance constraints of a node to anchors on one bone. Residual: sqrt(weight) (|x - p| - length) / anchor distance.
-class AnchorCost : public ceres::SizedCostFunction<4, 3> {
+/// Distance constraints of a node to its anchors on one bone, together as strong as four of the bone's weight. Residual:
+/// sqrt(4 weight / anchors) (|x - p| - length) / anchor distance.
+class AnchorCost : public ceres::CostFunction {
  public:
-  Eigen::Matrix<double, 3, 4> anchors;  // [m] world
-  Eigen::Vector4d lengths;              // [m]
-  double strength = 1;                  // [1/m]
+  Anchors anchors;                                                        // [m] world
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostAnchors, 1> lengths;  // [m]
+  double strength = 1;                                                   // [1/m]
+
+  void hold(int count) {
+    set_num_residuals(count);
+    mutable_parameter_block_sizes()->assign(1, 3);
+  }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const Eigen::Map<const Eigen::Vector3d> x(parameters[0]);
-    for (int k = 0; k < 4; ++k) {
+    for (Eigen::Index k = 0; k < anchors.cols(); ++k) {
       const Eigen::Vector3d way = x - anchors.col(k);
       const double distance = way.norm();
       residuals[k] = strength * (distance - lengths[k]);
@@ -98,7 +118,9 @@ class FrameSolver {
         edges_(static_cast<std::size_t>(mesh.edges.cols())),
         problem_(unowned()) {
     for (std::size_t h = 0; h < anchors_.size(); ++h) {
-      anchors_[h].strength = std::sqrt(rig.holds[h].weight) / rig.anchor_distance;
+      const auto count = static_cast<int>(rig.directions.cols());
+      anchors_[h].hold(count);
+      anchors_[h].strength = std::sqrt(4.0 / count * rig.holds[h].weight) / rig.anchor_distance;
       problem_.AddResidualBlock(&anchors_[h], nullptr, positions_.col(rig.holds[h].node).data());
     }
     for (std::size_t e = 0; e < edges_.size(); ++e) {
@@ -123,7 +145,7 @@ class FrameSolver {
     for (std::size_t h = 0; h < anchors_.size(); ++h) {
       const auto& [node, bone, weight] = rig_.holds[h];
       const Eigen::Affine3d& move = motion[static_cast<std::size_t>(bone)];
-      const Eigen::Matrix<double, 3, 4> ways = move.linear() * rig_.directions;
+      const Anchors ways = move.linear() * rig_.directions;
       const Eigen::Vector3d hub = move * bind_pose.col(node);
       anchors_[h].anchors = ways.colwise() + hub;
       anchors_[h].lengths = ways.colwise().norm();

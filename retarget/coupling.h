@@ -15,6 +15,7 @@ struct CouplingOptions {
   double least_weight = 0.05;  // bones of less weight hold no anchors of a node
   double least_morph = 0.01;   // of the skin's longest side: a morph target that never moves a node so far leaves the body alone
   double most_volume_change = 0.1;  // of what such a target moves: a body that keeps its volume cannot follow more
+  bool symmetric = false;      // twice as many anchors, so that a motion that is its own mirror image stays so on a mesh that is
   int max_iterations = 30;     // of the solver, a frame
   int threads = 1;             // frames are solved apart from each other: the outcome does not hang on it
 };
@@ -34,9 +35,9 @@ struct CoupledMotion {
   std::vector<std::string> left_large_morphs;  // names of those that are large and yet not carried, for they change volume
 };
 
-/// Plays the clip on the control mesh. Each node hangs on four anchors, the corners of a tetrahedron about it, on each bone
-/// that owns it, by distance constraints of the bind pose's lengths with the bone's weight as strength; anchors move with
-/// their bones. Per frame the node positions are those that minimise the constraints' errors and those of the mesh's edges,
+/// Plays the clip on the control mesh. Each node hangs on four anchors, the corners of a tetrahedron about it, or where symmetric on all
+/// eight of a cube's, on each bone that owns it, by distance constraints of the bind pose's lengths with the bone's weight as strength;
+/// anchors move with their bones. Per frame the node positions are those that minimise the constraints' errors and those of the mesh's edges,
 /// from linear blend skinning as first guess. A bone that stretches or squashes takes the lengths along. Rigid motion of all
 /// bones is reproduced exactly. Morph targets that are large enough for the mesh and keep the volume of what they move
 /// move the nodes in the bind pose, as the skin around them (retarget/morphs.h). skin_embedding is that of the skin's vertices. Throws Error where the clip has no frame.

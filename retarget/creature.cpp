@@ -1,12 +1,15 @@
 #include "retarget/creature.h"
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "physics/element_body.h"
 #include "physics/element_calibration.h"
 #include "retarget/com_path.h"
 #include "retarget/error.h"
 #include "retarget/loop.h"
+#include "retarget/mirror.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -20,6 +23,8 @@ constexpr const char* kFromFeet = "from feet";
 constexpr double kOwnTravel = 0.05;                // of L: less is a clip in place, which is there to be repeated
 constexpr double kOrigins = 256;                   // [m] between the places that a clip may be brought from
 constexpr double kFlight = 0.05;                   // of D above the ground
+constexpr double kRoughFlight = 0.01;              // of L: about the same, before there is a body
+constexpr Eigen::Index kMirrorFrames = 60;         // of a clip, at most, that are looked at for its mirror image
 
 void scale_character(Character& character, double scale) {
   const auto scaled = [scale](const Eigen::Affine3d& pose) {
@@ -72,6 +77,27 @@ double bring_to_origin(Character& character) {
     for (Eigen::Affine3d& pose : frame) pose.translation() -= shift;
   }
   return shift.norm();
+}
+
+/// The clip as a loop, where it is one and is not meant to be played once. Points' masses, L and a flight's least height [m].
+Motion looped(const Motion& clip, const Eigen::VectorXd& mass, double length, double flight_height) {
+  const Motion loop = close_loop(clip, mass, kLoopTolerance * length);
+  const bool is_for_once = loop.travel.norm() > kOwnTravel * length && was_made_to_be_played_once(clip, mass, flight_height);
+  return is_for_once ? clip : loop;
+}
+
+/// The axis of the bind pose across which the body is its own mirror image, where it is that in every moment of a clip that is a loop, too:
+/// what turns it a little adds up there, and what is played once has its own times.
+std::optional<int> mirror_axis_of_loop(const Character& character, double length) {
+  const Eigen::Index frames = character.clip.frames(), looked_at = std::min(frames, kMirrorFrames);
+  if (looked_at < 2) return std::nullopt;
+  Motion skin, rest;
+  skin.frames.resize(character.skin.vertices.size(), looked_at);
+  for (Eigen::Index k = 0; k < looked_at; ++k) skin.at(k) = skin_positions(character, k * (frames - 1) / (looked_at - 1));
+  const Eigen::VectorXd mass = Eigen::VectorXd::Ones(character.skin.vertices.cols());
+  if (!looped(skin, mass, length, kRoughFlight * length).loop) return std::nullopt;
+  rest.frames = character.skin.vertices.reshaped();
+  return mirror_axis(skin, length) ? mirror_axis(rest, length) : std::nullopt;
 }
 
 /// The skin's vertices with the moves that made the clip a loop with its travel on the ground. `loop` is the clip as
@@ -135,11 +161,14 @@ Creature make_creature(const Character& character, const CreatureOptions& option
     creature.warnings.push_back(text);
   }
 
+  const std::optional<int> across = mirror_axis_of_loop(creature.character, creature.length);
+  creature.is_mirror_image = across.has_value();
   BodyOptions body_options;
   body_options.nodes = options.nodes;
+  body_options.mirror_axis = across;
   creature.mesh = build_control_mesh(creature.character.skeleton, creature.character.skin, body_options);
   creature.skin = embed_skin(creature.mesh, creature.character.skin);
-  creature.contacts = contact_points(creature.mesh, creature.character.skeleton, creature.character.skin);
+  creature.contacts = contact_points(creature.mesh, creature.character.skeleton, creature.character.skin, creature.is_mirror_image);
 
   creature.youngs_modulus = options.density * kGravity * creature.length / options.softness;
   creature.scene.body = options.material == BodyMaterial::kSprings
@@ -156,6 +185,7 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   const Character& character = creature.character;
   CouplingOptions coupling_options;
   coupling_options.threads = options.threads;
+  coupling_options.symmetric = creature.is_mirror_image;
   const CoupledMotion coupled = couple(character, creature.mesh, creature.skin, coupling_options);
   ImportedMotion result;
   result.coupling.error_rms_length = coupled.error_rms_length;
@@ -171,9 +201,7 @@ ImportedMotion import_motion(const Creature& creature, const CreatureOptions& op
   }
   Eigen::VectorXd mass = Eigen::VectorXd::Zero(nodes + points);
   mass.head(nodes) = creature.scene.body.mass;
-  const Motion clip = both;
-  both = close_loop(both, mass, kLoopTolerance * creature.length);
-  if (both.travel.norm() > kOwnTravel * creature.length && was_made_to_be_played_once(clip, mass, kFlight * creature.size)) both = clip;
+  both = looped(both, mass, creature.length, kFlight * creature.size);
   Motion skin_points = both;
   skin_points.frames = both.frames.bottomRows(3 * points);
   Motion com = both;

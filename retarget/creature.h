@@ -47,6 +47,7 @@ struct Creature {
   ContactPoints contacts;
   physics::Scene scene;
   double length = 1, size = 1; // L and D [m]
+  bool is_mirror_image = false;  // of itself all through a loop: it hops, or crawls straight on
   double youngs_modulus = 0;   // [Pa]; what calibrated tets have less is told by the body's elements alone
   std::vector<std::string> warnings;
 };

@@ -45,28 +45,30 @@ Embedding embed_skin(const ControlMesh& mesh, const SkinnedMesh& skin) {
   return embed(mesh, skin.vertices, mesh.vertex_cells);
 }
 
-ContactPoints contact_points(const ControlMesh& mesh, const Skeleton& skeleton, const SkinnedMesh& skin) {
-  constexpr double kSpacing = 0.35;  // cells
+ContactPoints contact_points(const ControlMesh& mesh, const Skeleton& skeleton, const SkinnedMesh& skin, bool symmetric) {
+  constexpr double kSpacing = 0.35;       // cells
+  constexpr double kImageSpacing = 0.01;  // of the spacing: mirror images may lie closer, for neither goes before the other
   const double spacing = kSpacing * std::cbrt(mesh.cell_size.prod());
   const auto different_limbs = bones_of_different_limbs(skeleton);
   const Eigen::VectorXi bones = dominant_bones(skin);
   const Eigen::Vector3d low = skin.vertices.rowwise().minCoeff();
   const Eigen::Vector3d middle = 0.5 * (low + skin.vertices.rowwise().maxCoeff());
-  // Lowest first; among equals the outermost, so that a symmetric sole gets symmetric points.
+  // Lowest first; among equals the outermost, so that a symmetric sole gets symmetric points. Mirror images have one rank.
   auto rank = [&](int v) {
     const Eigen::Vector3d x = skin.vertices.col(v);
     const double grain = 1e-3 * spacing;
     return std::tuple(std::lround((x[1] - low[1]) / grain), -std::lround(std::abs(x[0] - middle[0]) / grain),
-                      -std::lround(std::abs(x[2] - middle[2]) / grain), v);
+                      -std::lround(std::abs(x[2] - middle[2]) / grain));
   };
   std::vector<int> order(static_cast<std::size_t>(skin.vertices.cols()));
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return rank(a) < rank(b); });
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return rank(a) < rank(b); });
 
   std::vector<int> chosen;
   for (const int v : order) {
     const bool is_free = std::none_of(chosen.begin(), chosen.end(), [&](int other) {
-      return (skin.vertices.col(v) - skin.vertices.col(other)).squaredNorm() < spacing * spacing &&
+      const double least = (symmetric && rank(v) == rank(other) ? kImageSpacing : 1) * spacing;
+      return (skin.vertices.col(v) - skin.vertices.col(other)).squaredNorm() < least * least &&
              !different_limbs(bones[v], bones[other]);
     });
     if (is_free) chosen.push_back(v);

@@ -7,8 +7,9 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kOffImage = 0.05;       // of L: further off in the mean is no mirror image
-constexpr double kMovesOffImage = 0.02;  // likewise of what moves, RMS
+constexpr double kOffImage = 0.05;         // of L: further off in the mean is no mirror image
+constexpr double kMovesOffImage = 0.02;    // likewise of what moves, RMS
+constexpr Eigen::Index kMostAsked = 1000;  // points whose images are looked for, evenly spread over their numbers
 
 /// Mean distance [m] of the points of a to the nearest of b.
 double mean_distance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
@@ -22,13 +23,12 @@ Eigen::Matrix3Xd mirrored(Eigen::Matrix3Xd points, int axis, double middle) {
   return points;
 }
 
-/// Of each point, which one is nearest to its image.
-std::vector<Eigen::Index> nearest_to_images(const Eigen::Matrix3Xd& points, int axis) {
-  const Eigen::Matrix3Xd images = mirrored(points, axis, points.row(axis).mean());
-  std::vector<Eigen::Index> nearest(static_cast<std::size_t>(points.cols()));
-  for (Eigen::Index p = 0; p < points.cols(); ++p) {
-    (points.colwise() - images.col(p)).colwise().squaredNorm().minCoeff(&nearest[static_cast<std::size_t>(p)]);
-  }
+/// Of each of the asked points, which one is nearest to its image.
+std::vector<Eigen::Index> nearest_to_images(const Eigen::Matrix3Xd& points, const std::vector<Eigen::Index>& asked, int axis) {
+  const Eigen::Matrix3Xd images = mirrored(points(Eigen::all, asked), axis, points.row(axis).mean());
+  std::vector<Eigen::Index> nearest(asked.size());
+  for (std::size_t k = 0; k < asked.size(); ++k)
+    (points.colwise() - images.col(static_cast<Eigen::Index>(k))).colwise().squaredNorm().minCoeff(&nearest[k]);
   return nearest;
 }
 
@@ -38,12 +38,14 @@ std::optional<int> mirror_axis(const Motion& points, double length) {
   Eigen::Matrix3Xd pose = Eigen::Matrix3Xd::Zero(3, points.frames.rows() / 3);  // the mean one: in a single frame feet may meet
   for (Eigen::Index f = 0; f < points.count(); ++f) pose += points.at(f).colwise() - points.at(f).rowwise().mean();
   pose /= static_cast<double>(points.count());
+  std::vector<Eigen::Index> asked;
+  for (Eigen::Index p = 0; p < pose.cols(); p += (pose.cols() + kMostAsked - 1) / kMostAsked) asked.push_back(p);
   for (const int axis : {0, 2}) {
-    const std::vector<Eigen::Index> twins = nearest_to_images(pose, axis);
+    const std::vector<Eigen::Index> twins = nearest_to_images(pose, asked, axis);
     double squared = 0;
     for (Eigen::Index f = 0; f < points.count(); ++f) {
-      const Eigen::Matrix3Xd x = points.at(f), images = mirrored(x, axis, x.row(axis).mean());
-      squared += (x(Eigen::all, twins) - images).squaredNorm() / static_cast<double>(x.cols());
+      const Eigen::Matrix3Xd x = points.at(f), images = mirrored(x(Eigen::all, asked), axis, x.row(axis).mean());
+      squared += (x(Eigen::all, twins) - images).squaredNorm() / static_cast<double>(asked.size());
     }
     if (std::sqrt(squared / static_cast<double>(points.count())) < kMovesOffImage * length) return axis;
   }

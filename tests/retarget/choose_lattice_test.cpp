@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "shapes.h"
 
 namespace hydrostat::retarget::choose_lattice_test {
@@ -36,6 +38,22 @@ TEST(RankedLattices, AreNearCubesWithTheWantedNodesFirst) {
       EXPECT_LE(size.maxCoeff(), 1.4 * size.minCoeff() * (1 + 1e-9));
     }
     EXPECT_NEAR(1.0 * (lattices[0].array() + 1).prod() / wanted, 1, 0.2);  // a full brick uses every node
+  }
+}
+
+TEST(RankedLattices, OfAMirrorImageOfItselfAreNotThreeCellsAcross) {
+  for (const int across : {0, 2}) {
+    SCOPED_TRACE(across);
+    Eigen::Vector3d size(0.45, 0.47, 0.45);
+    size[2 - across] = 3;
+    const SkinnedMesh worm = box_skin({0, 0, 0}, size);
+    const TriangleSoup closed = with_closed_holes(worm.vertices, worm.triangles);
+    const auto first = [&](std::optional<int> mirror_axis) {
+      return ranked_lattices(worm, closed, {.nodes = 330, .mirror_axis = mirror_axis}).at(0);
+    };
+    EXPECT_EQ(first(std::nullopt)[across], 3);
+    EXPECT_EQ(first(across)[across] % 2, 0);
+    EXPECT_EQ(first(2 - across)[across], 3) << "what lies along matters not";
   }
 }
 

@@ -56,10 +56,12 @@ TEST(Coupling, MovesTheMeshRigidlyWithItsBones) {
     std::srand(seed);
     Eigen::Affine3d map = Eigen::Translation3d(Eigen::Vector3d::Random()) * Eigen::Quaterniond::UnitRandom();
     character.clip = clip_of({moved_bones(character.skeleton, map)});
-    const CoupledMotion coupled = couple(character, body.mesh, body.skin_embedding);
-    EXPECT_LT((coupled.motion.at(0) - map * body.mesh.nodes).cwiseAbs().maxCoeff(), 1e-9);
-    EXPECT_LT(coupled.error_max_length, 1e-9);
-    EXPECT_EQ(coupled.unconverged_frames, 0);
+    for (const bool symmetric : {false, true}) {
+      const CoupledMotion coupled = couple(character, body.mesh, body.skin_embedding, {.symmetric = symmetric});
+      EXPECT_LT((coupled.motion.at(0) - map * body.mesh.nodes).cwiseAbs().maxCoeff(), 1e-9);
+      EXPECT_LT(coupled.error_max_length, 1e-9);
+      EXPECT_EQ(coupled.unconverged_frames, 0);
+    }
   }
 }
 
@@ -87,6 +89,35 @@ TEST(Coupling, FollowsABendingWorm) {
   EXPECT_GT(coupled.error_max_length, 1e-4);
   EXPECT_LT(coupled.error_rms_length, 0.005);  // [L]
   EXPECT_LT(coupled.error_max_length, 0.02);
+}
+
+/// The mirror image of each node across x = 0, by its number.
+std::vector<Eigen::Index> mirrored_nodes(const Eigen::Matrix3Xd& nodes) {
+  std::vector<Eigen::Index> images;
+  for (const auto node : nodes.colwise()) {
+    Eigen::Index image = 0;
+    const double miss = (nodes.colwise() - Eigen::Vector3d(-node.x(), node.y(), node.z())).colwise().norm().minCoeff(&image);
+    EXPECT_LT(miss, 1e-9);
+    images.push_back(image);
+  }
+  return images;
+}
+
+TEST(Coupling, OfSymmetricAnchorsKeepsAMirrorImageOfItselfOne) {
+  Character character = worm();
+  Setting body;
+  body.mesh = build_control_mesh(character.skeleton, character.skin, {.lattice = {2, 2, 16}, .least_fill = 0});
+  body.skin_embedding = embed_skin(body.mesh, character.skin);
+  const std::vector<Eigen::Index> images = mirrored_nodes(body.mesh.nodes);
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    character.clip = clip_of({bent_bones(character.skeleton, std::uniform_real_distribution<double>(-0.4, 0.4)(random))});
+    const CoupledMotion coupled = couple(character, body.mesh, body.skin_embedding, {.symmetric = true});
+    Eigen::Matrix3Xd mirrored = coupled.motion.at(0)(Eigen::all, images);
+    mirrored.row(0) *= -1;
+    EXPECT_LT((mirrored - coupled.motion.at(0)).cwiseAbs().maxCoeff(), 5e-6);  // [m]; the solver's tolerance
+  }
 }
 
 TEST(Coupling, ReportsTheDistanceToTheSkinnedClip) {

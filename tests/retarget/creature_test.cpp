@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -80,6 +81,30 @@ TEST(MakeCreature, HeightDecides) {
   EXPECT_NEAR(extent(creature.character.skin.vertices, 1), 2, 1e-9);
   EXPECT_NEAR(creature.length, 5, 1e-9);
   EXPECT_TRUE(creature.warnings.empty());
+}
+
+TEST(MakeCreature, TellsWhatIsItsOwnMirrorImageAllThroughALoop) {
+  const auto is_mirror_image = [](const Character& character) { return make_creature(character, {}).is_mirror_image; };
+  EXPECT_TRUE(is_mirror_image(block(1, {0, 0, 0}, 8)));
+  EXPECT_TRUE(is_mirror_image(block(1, {0.6, 0, -0.3}, 200)));
+  Character turning = block(1, {0, 0, 0}, 100), once = block(1, {0.6, 0, 0}, 100);
+  Character lopsided = block(1, {0, 0, 0}, 8), still = block(1, {0, 0, 0}, 8);
+  for (std::size_t f = 0; f < 100; ++f) {
+    const double share = static_cast<double>(f) / 99.0;
+    turning.clip.bone_pose[f][0].rotate(Eigen::AngleAxisd(0.3 * std::sin(2 * M_PI * share), Eigen::Vector3d::UnitY()));
+    const double flown = std::clamp((share - 0.3) / 0.4, 0.0, 1.0);
+    once.clip.bone_pose[f][0].translation() << 0.6 * flown, 0.3 * std::sin(M_PI * flown), 0;
+  }
+  EXPECT_FALSE(is_mirror_image(turning));
+  EXPECT_FALSE(is_mirror_image(once));
+  for (auto vertex : lopsided.skin.vertices.colwise()) {
+    const Eigen::Vector3d x = vertex;
+    vertex.x() += x.y() * x.z() * x.x();  // a twisted wedge
+    vertex.z() += 0.5 * x.y() * x.x();
+  }
+  EXPECT_FALSE(is_mirror_image(lopsided));
+  still.clip.bone_pose.clear();
+  EXPECT_FALSE(is_mirror_image(still));
 }
 
 TEST(ImportMotion, StandsOnTheGroundWhateverTheClipsHeight) {

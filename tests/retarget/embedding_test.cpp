@@ -76,6 +76,22 @@ TEST(ContactPoints, LieApartAndCoverTheSkin) {
   EXPECT_LT((embedded_positions(contact.embedding, mesh.nodes) - points).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+TEST(ContactPoints, OfAMirrorImageOfItselfAreOneWhereTheyAreToBeSymmetric) {
+  for (const Character& body : some_bodies()) {
+    const ControlMesh mesh = build_control_mesh(body.skeleton, body.skin);
+    const ContactPoints contact = contact_points(mesh, body.skeleton, body.skin, /*symmetric=*/true);
+    const Eigen::Matrix3Xd points = body.skin.vertices(Eigen::all, contact.vertices);
+    const double spacing = 0.35 * std::cbrt(mesh.cell_size.prod());
+    for (Eigen::Index p = 0; p < points.cols(); ++p) {
+      const Eigen::Vector3d point = points.col(p), image(-point.x(), point.y(), point.z());
+      EXPECT_LT((points.colwise() - image).colwise().norm().minCoeff(), 1e-9);
+      for (Eigen::Index q = 0; q < p; ++q) EXPECT_GE((points.col(q) - point).norm(), 0.01 * spacing * (1 - 1e-12));
+    }
+    for (const auto vertex : body.skin.vertices.colwise())
+      EXPECT_LT((points.colwise() - vertex).colwise().norm().minCoeff(), spacing);
+  }
+}
+
 TEST(ContactPoints, StartWithTheSoles) {
   const Character body = two_legged(0.1);
   const ControlMesh mesh = build_control_mesh(body.skeleton, body.skin);

@@ -94,5 +94,17 @@ TEST(MirrorAxis, IsThatOfWhatHopsAndNoneOfWhatSteps) {
   }
 }
 
+TEST(MirrorAxis, OfManyPointsIsThatOfAFew) {
+  constexpr int kHeads = 2000 / kPerBone;  // before all others: by the first thousand points nothing steps
+  std::mt19937 random(1);
+  Points points = four_legger(random, 0, false);
+  const Eigen::Matrix3Xd head = points.rest.rightCols(kPerBone), body = points.rest;
+  points.rest.resize(3, kHeads * kPerBone + body.cols());
+  points.rest << head.replicate(1, kHeads), body;
+  points.bone_of_point.insert(points.bone_of_point.begin(), kHeads * kPerBone, kFeet);
+  EXPECT_EQ(mirror_axis(stepping(points, 0, {0, 0, 0.5}, 2), 1), 0);
+  EXPECT_EQ(mirror_axis(stepping(points, 0.5, {0, 0, 0.5}, 2), 1), std::nullopt);
+}
+
 }  // namespace
 }  // namespace hydrostat::retarget::mirror_test

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "retarget/at.h"
@@ -62,22 +63,18 @@ Lattice fitted_lattice(const SkinnedMesh& skin, const Eigen::Vector3i& cells, in
   return lattice;
 }
 
-double misfit(double nodes, double mean_fill, const Eigen::Vector3d& cell_size, const BodyOptions& options) {
+double misfit(const LatticeBody& body, const BodyOptions& options) {
   constexpr double kUsual = 200, kFewest = 100, kMost = 600;
+  constexpr double kThreeAcross = 0.9;  // as ill as a third too many or too few nodes
   const double wanted = options.nodes > 0 ? options.nodes : kUsual;
-  const double count = std::abs(std::log(nodes / wanted)) * (options.nodes > 0 ? 3.0 : 0.5);
+  const double count = std::abs(std::log(body.nodes / wanted)) * (options.nodes > 0 ? 3.0 : 0.5);
   const double range =
-      options.nodes > 0 ? 0 : 10 * (std::max(0.0, std::log(kFewest / nodes)) + std::max(0.0, std::log(nodes / kMost)));
-  return count + range + (1 - mean_fill) + 0.3 * std::log(cell_size.maxCoeff() / cell_size.minCoeff());
+      options.nodes > 0 ? 0 : 10 * (std::max(0.0, std::log(kFewest / body.nodes)) + std::max(0.0, std::log(body.nodes / kMost)));
+  const double lopsided = options.mirror_axis && body.cells[*options.mirror_axis] == 3 ? kThreeAcross : 0;
+  return count + range + (1 - body.fill) + 0.3 * std::log(body.cell_size.maxCoeff() / body.cell_size.minCoeff()) + lopsided;
 }
 
-double lopsidedness(const Eigen::Vector3i& cells, const BodyOptions& options) {
-  constexpr double kThree = 0.9;  // as ill as a third too many or too few nodes
-  return options.mirror_axis && cells[*options.mirror_axis] == 3 ? kThree : 0;
-}
-
-std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const TriangleSoup& closed,
-                                             const BodyOptions& options) {
+std::vector<LatticeBody> ranked_lattices(const SkinnedMesh& skin, const TriangleSoup& closed, const BodyOptions& options) {
   constexpr double kRoughVoxels = 120;  // along the longest side
   constexpr double kLongestCell = 1.4;  // over the shortest side
   constexpr double kMostNodes = 5000;
@@ -88,7 +85,7 @@ std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const Tria
   const std::vector<Eigen::Vector3d> middles = body_middles(closed, rough);
 
   std::set<std::array<int, 3>> tried;
-  std::vector<std::pair<double, std::array<int, 3>>> ranked;
+  std::vector<LatticeBody> ranked;
   const double wanted = options.nodes > 0 ? options.nodes : 600;
   // A body that is longer and thinner than that takes more nodes than wanted, up to as many as there may be.
   const auto is_sought = [&](double along) { return along <= wanted / 3 || (ranked.empty() && along <= kMostNodes / 3); };
@@ -100,15 +97,15 @@ std::vector<Eigen::Vector3i> ranked_lattices(const SkinnedMesh& skin, const Tria
       const Lattice lattice = fitted_lattice(skin, cells, 1);
       if (lattice.cell_size.maxCoeff() > kLongestCell * lattice.cell_size.minCoeff() * (1 + 1e-9)) continue;
       const auto [nodes, fill] = estimated_body(middles, rough.cell_size.prod(), lattice, options.least_fill);
-      const double score = misfit(nodes, fill, lattice.cell_size, options) + lopsidedness(cells, options);
-      if (nodes > 0) ranked.push_back({score, {cells[0], cells[1], cells[2]}});
+      if (nodes > 0) ranked.push_back({cells, lattice.cell_size, nodes, fill});
       if (nodes > 4 * wanted) along = wanted;  // finer lattices only have more
     }
   }
-  std::sort(ranked.begin(), ranked.end());
-  std::vector<Eigen::Vector3i> best;
-  for (const auto& [score, cells] : ranked) best.emplace_back(cells[0], cells[1], cells[2]);
-  return best;
+  const auto rank = [&](const LatticeBody& body) {
+    return std::tuple(misfit(body, options), body.cells[0], body.cells[1], body.cells[2]);
+  };
+  std::sort(ranked.begin(), ranked.end(), [&](const LatticeBody& a, const LatticeBody& b) { return rank(a) < rank(b); });
+  return ranked;
 }
 
 }  // namespace hydrostat::retarget

@@ -61,17 +61,28 @@ std::string broken_rule(const BodyOptions& options) {
 ControlMesh build_control_mesh(const Skeleton& skeleton, const SkinnedMesh& skin, const BodyOptions& options) {
   refuse_empty(skin);
   constexpr int kFine = 10;
+  constexpr int kTries = 3, kMostTries = 8;
   const TriangleSoup closed = with_closed_holes(skin.vertices, skin.triangles);
-  const std::vector<Eigen::Vector3i> lattices =
-      options.lattice.isZero() ? ranked_lattices(skin, closed, options) : std::vector<Eigen::Vector3i>{options.lattice};
+  std::vector<LatticeBody> lattices = options.lattice.isZero()
+                                          ? ranked_lattices(skin, closed, options)
+                                          : std::vector<LatticeBody>{{options.lattice, Eigen::Vector3d::Ones(), 1, 1}};
   if (lattices.empty())
     throw Error("", "mesh", "the body is too long and thin for 5000 control nodes", "Shorten or thicken it.");
-  const std::size_t tries = std::min<std::size_t>(3, lattices.size());
   ControlMesh best;
   double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < tries; ++i) {
-    ControlMesh mesh = mesh_in_lattice(skeleton, skin, closed, options.least_fill, fitted_lattice(skin, lattices[i], kFine));
-    const double score = misfit(mesh.node_count(), mesh.tet_fill.mean(), mesh.cell_size, options) + lopsidedness(lattices[i], options);
+  double nodes_per_estimated = 1;  // of a wished number, as the last one tried has it
+  const auto foreseen = [&](LatticeBody body) {
+    body.nodes *= nodes_per_estimated;
+    return misfit(body, options);
+  };
+  for (int tries = 0; !lattices.empty() && tries < kMostTries; ++tries) {
+    const auto next = std::min_element(lattices.begin(), lattices.end(),
+                                       [&](const LatticeBody& a, const LatticeBody& b) { return foreseen(a) < foreseen(b); });
+    if (tries >= kTries && (options.nodes == 0 || foreseen(*next) >= least)) break;
+    ControlMesh mesh = mesh_in_lattice(skeleton, skin, closed, options.least_fill, fitted_lattice(skin, next->cells, kFine));
+    if (options.nodes > 0) nodes_per_estimated = mesh.node_count() / next->nodes;
+    const double score = misfit({next->cells, mesh.cell_size, static_cast<double>(mesh.node_count()), mesh.tet_fill.mean()}, options);
+    lattices.erase(next);
     if (score >= least) continue;
     least = score;
     best = std::move(mesh);

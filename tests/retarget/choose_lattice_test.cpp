@@ -31,13 +31,13 @@ TEST(RankedLattices, AreNearCubesWithTheWantedNodesFirst) {
   const TriangleSoup closed = with_closed_holes(brick.vertices, brick.triangles);
   for (const int wanted : {60, 150, 400}) {
     SCOPED_TRACE(wanted);
-    const std::vector<Eigen::Vector3i> lattices = ranked_lattices(brick, closed, {.nodes = wanted});
+    const std::vector<LatticeBody> lattices = ranked_lattices(brick, closed, {.nodes = wanted});
     ASSERT_FALSE(lattices.empty());
-    for (const Eigen::Vector3i& cells : lattices) {
-      const Eigen::Vector3d size = fitted_lattice(brick, cells, 1).cell_size;
+    for (const LatticeBody& lattice : lattices) {
+      const Eigen::Vector3d& size = lattice.cell_size;
       EXPECT_LE(size.maxCoeff(), 1.4 * size.minCoeff() * (1 + 1e-9));
     }
-    EXPECT_NEAR(1.0 * (lattices[0].array() + 1).prod() / wanted, 1, 0.2);  // a full brick uses every node
+    EXPECT_NEAR(1.0 * (lattices[0].cells.array() + 1).prod() / wanted, 1, 0.2);  // a full brick uses every node
   }
 }
 
@@ -49,7 +49,7 @@ TEST(RankedLattices, OfAMirrorImageOfItselfAreNotThreeCellsAcross) {
     const SkinnedMesh worm = box_skin({0, 0, 0}, size);
     const TriangleSoup closed = with_closed_holes(worm.vertices, worm.triangles);
     const auto first = [&](std::optional<int> mirror_axis) {
-      return ranked_lattices(worm, closed, {.nodes = 330, .mirror_axis = mirror_axis}).at(0);
+      return ranked_lattices(worm, closed, {.nodes = 330, .mirror_axis = mirror_axis}).at(0).cells;
     };
     EXPECT_EQ(first(std::nullopt)[across], 3);
     EXPECT_EQ(first(across)[across] % 2, 0);
@@ -61,12 +61,15 @@ TEST(Misfit, PrefersFullCubesOfTheWantedNumber) {
   const Eigen::Vector3d cube(1, 1, 1), slab(1, 1.3, 1);
   for (const int wanted : {0, 200}) {
     const BodyOptions options{.nodes = wanted};
-    const double best = misfit(200, 1, cube, options);
+    const auto of = [&](double nodes, double fill, const Eigen::Vector3d& cell_size) {
+      return misfit({{4, 4, 7}, cell_size, nodes, fill}, options);
+    };
+    const double best = of(200, 1, cube);
     EXPECT_NEAR(best, 0, 1e-15);
-    EXPECT_GT(misfit(200, 0.7, cube, options), best);
-    EXPECT_GT(misfit(200, 1, slab, options), best);
-    EXPECT_GT(misfit(150, 1, cube, options), best);
-    EXPECT_GT(misfit(300, 1, cube, options), best);
+    EXPECT_GT(of(200, 0.7, cube), best);
+    EXPECT_GT(of(200, 1, slab), best);
+    EXPECT_GT(of(150, 1, cube), best);
+    EXPECT_GT(of(300, 1, cube), best);
   }
 }
 

@@ -57,6 +57,33 @@ TEST(ControlMesh, IsOnePieceOfAboutTheWantedSize) {
   }
 }
 
+/// A flat trunk, bone 0, on eight thin legs that spread, bones 1 to 8.
+Character spider() {
+  Character body;
+  std::vector<Eigen::Vector3d> places{{0, 0.3, 0}};
+  body.skin = ball_skin({0.2, 0.08, 0.3});
+  for (auto vertex : body.skin.vertices.colwise()) vertex.y() += 0.3;
+  for (int leg = 0; leg < 8; ++leg) {
+    const double angle = (0.5 + leg) * M_PI / 4;
+    const Eigen::Vector3d out(std::cos(angle), 0, std::sin(angle)), hip = 0.15 * out + Eigen::Vector3d(0, 0.3, 0);
+    SkinnedMesh shank = box_skin({-0.02, -0.02, 0}, {0.02, 0.02, 0.5}, leg + 1);
+    const auto spread = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), out - 0.7 * Eigen::Vector3d::UnitY());
+    shank.vertices = (spread.toRotationMatrix() * shank.vertices).eval().colwise() + hip;
+    body.skin = joined(body.skin, shank);
+    places.push_back(hip);
+  }
+  body.skeleton = skeleton_of({-1, 0, 0, 0, 0, 0, 0, 0, 0}, places);
+  return body;
+}
+
+TEST(ControlMesh, OfThinLegsHasAboutAsManyNodesAsWished) {
+  const Character body = spider();
+  for (const int wanted : {150, 200, 400}) {
+    SCOPED_TRACE(wanted);
+    EXPECT_NEAR(1.0 * build_control_mesh(body.skeleton, body.skin, {.nodes = wanted}).node_count() / wanted, 1, 0.15);
+  }
+}
+
 TEST(ControlMesh, HasPositiveTetsAndWeightsThatSumToOne) {
   for (const auto& [name, character] : many_bodies()) {
     SCOPED_TRACE(name);

@@ -154,7 +154,7 @@ void name_fields(RecordArchive& archive, physics::Scene& scene) {
 void name_fields(RecordArchive& archive, retarget::Creature& creature) {
   archive.fields("character", creature.character, "scale", creature.scale, "mesh", creature.mesh, "skin", creature.skin,
                  "contacts", creature.contacts, "scene", creature.scene, "length", creature.length, "size", creature.size,
-                 "youngs_modulus", creature.youngs_modulus, "warnings", creature.warnings);
+                 "is_mirror_image", creature.is_mirror_image, "youngs_modulus", creature.youngs_modulus, "warnings", creature.warnings);
 }
 
 void name_fields(RecordArchive& archive, retarget::CouplingReport& report) {

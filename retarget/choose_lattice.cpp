@@ -13,8 +13,7 @@
 namespace hydrostat::retarget {
 namespace {
 
-/// Nodes and mean fill that a lattice would have, counted on the middles of voxels that another lattice marked: within a few
-/// per cent.
+/// Nodes and mean fill that a lattice would have, counted on the middles of voxels that another lattice marked.
 std::pair<double, double> estimated_body(const std::vector<Eigen::Vector3d>& middles, double voxel_volume,
                                          const Lattice& lattice, double least_fill) {
   const Grid cells{lattice.cells};
@@ -65,7 +64,7 @@ Lattice fitted_lattice(const SkinnedMesh& skin, const Eigen::Vector3i& cells, in
 
 double misfit(const LatticeBody& body, const BodyOptions& options) {
   constexpr double kUsual = 200, kFewest = 100, kMost = 600;
-  constexpr double kThreeAcross = 0.9;  // as ill as a third too many or too few nodes
+  constexpr double kThreeAcross = 0.9;  // as ill as a third more nodes than wished
   const double wanted = options.nodes > 0 ? options.nodes : kUsual;
   const double count = std::abs(std::log(body.nodes / wanted)) * (options.nodes > 0 ? 3.0 : 0.5);
   const double range =

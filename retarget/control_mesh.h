@@ -63,8 +63,9 @@ struct ContactPoints {
 /// Limbs that are far apart along the skeleton never share a cell, not even where their skins touch. The body is one piece
 /// joined by faces: what is not, is joined by the fullest cells between. Open, inside-out, overlapping and many-shelled
 /// skins are bodies too; a flat sheet gives a thin one. Deterministic. Throws Error where the skin has no triangle or no
-/// extent, or is too long and thin for 5000 nodes; shorter ones may take more nodes than wished. Source: Nesme, Kry, Jerabkova, Faure, "Preserving topology and elasticity for embedded deformable models",
-/// SIGGRAPH 2009, section 3 (copies of cells). We count connection by faces of voxels and by bones, too.
+/// extent, or is too long and thin for 5000 nodes; shorter ones may take more nodes than wished. Up to eight lattices are tried for a wished number, as long
+/// as what those before had of their estimates lets another come nearer. Source: Nesme, Kry, Jerabkova, Faure, "Preserving topology and
+/// elasticity for embedded deformable models", SIGGRAPH 2009, section 3 (copies of cells). We count connection by faces of voxels and by bones, too.
 ControlMesh build_control_mesh(const Skeleton& skeleton, const SkinnedMesh& skin, const BodyOptions& options = {});
 
 /// Face-connected pieces of a tet mesh.

@@ -35,8 +35,8 @@ struct CoupledMotion {
   std::vector<std::string> left_large_morphs;  // names of those that are large and yet not carried, for they change volume
 };
 
-/// Plays the clip on the control mesh. Each node hangs on four anchors, the corners of a tetrahedron about it, or where symmetric on all
-/// eight of a cube's, on each bone that owns it, by distance constraints of the bind pose's lengths with the bone's weight as strength;
+/// Plays the clip on the control mesh. Each node hangs on four anchors, the corners of a tetrahedron about it, or where symmetric
+/// on all eight of a cube's, on each bone that owns it, by distance constraints of the bind pose's lengths with the bone's weight as strength;
 /// anchors move with their bones. Per frame the node positions are those that minimise the constraints' errors and those of the mesh's edges,
 /// from linear blend skinning as first guess. A bone that stretches or squashes takes the lengths along. Rigid motion of all
 /// bones is reproduced exactly. Morph targets that are large enough for the mesh and keep the volume of what they move

@@ -25,6 +25,7 @@ constexpr double kOrigins = 256;                   // [m] between the places tha
 constexpr double kFlight = 0.05;                   // of D above the ground
 constexpr double kRoughFlight = 0.01;              // of L: about the same, before there is a body
 constexpr Eigen::Index kMirrorFrames = 60;         // of a clip, at most, that are looked at for its mirror image
+constexpr Eigen::Index kLoopVertices = 500;        // of a skin, at most, that tell of a loop
 
 void scale_character(Character& character, double scale) {
   const auto scaled = [scale](const Eigen::Affine3d& pose) {
@@ -86,18 +87,34 @@ Motion looped(const Motion& clip, const Eigen::VectorXd& mass, double length, do
   return is_for_once ? clip : loop;
 }
 
-/// The axis of the bind pose across which the body is its own mirror image, where it is that in every moment of a clip that is a loop, too:
-/// what turns it a little adds up there, and what is played once has its own times.
+/// Whether the clip is a loop and not meant to be played once, by a few of the skin's vertices.
+bool is_loop(const Character& character, double length) {
+  const auto& [skeleton, skin, clip] = character;
+  SkinnedMesh few;
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index v = 0; v < skin.vertices.cols(); v += (skin.vertices.cols() + kLoopVertices - 1) / kLoopVertices) {
+    kept.push_back(v);
+    few.skin_weights.push_back(skin.skin_weights[static_cast<std::size_t>(v)]);
+  }
+  few.vertices = skin.vertices(Eigen::all, kept);
+  Motion motion;
+  motion.rate_hz = clip.rate_hz;
+  motion.frames.resize(few.vertices.size(), clip.frames());
+  for (Eigen::Index f = 0; f < clip.frames(); ++f)
+    motion.at(f) = skin_positions(skeleton, few, clip.bone_pose[static_cast<std::size_t>(f)], {});
+  return looped(motion, Eigen::VectorXd::Ones(few.vertices.cols()), length, kRoughFlight * length).loop;
+}
+
+/// The axis across which the body is its own mirror image, in the bind pose and in every moment of a clip that is a loop: what turns it a
+/// little adds up there, and what is played once has its own times.
 std::optional<int> mirror_axis_of_loop(const Character& character, double length) {
   const Eigen::Index frames = character.clip.frames(), looked_at = std::min(frames, kMirrorFrames);
-  if (looked_at < 2) return std::nullopt;
-  Motion skin, rest;
+  if (looked_at < 2 || !is_loop(character, length)) return std::nullopt;
+  Motion skin;
   skin.frames.resize(character.skin.vertices.size(), looked_at);
   for (Eigen::Index k = 0; k < looked_at; ++k) skin.at(k) = skin_positions(character, k * (frames - 1) / (looked_at - 1));
-  const Eigen::VectorXd mass = Eigen::VectorXd::Ones(character.skin.vertices.cols());
-  if (!looped(skin, mass, length, kRoughFlight * length).loop) return std::nullopt;
-  rest.frames = character.skin.vertices.reshaped();
-  return mirror_axis(skin, length) ? mirror_axis(rest, length) : std::nullopt;
+  const std::optional<int> across = mirror_axis(skin, length);
+  return across && is_mirror_image(character.skin.vertices, *across, length) ? across : std::nullopt;
 }
 
 /// The skin's vertices with the moves that made the clip a loop with its travel on the ground. `loop` is the clip as

@@ -54,20 +54,21 @@ ContactPoints contact_points(const ControlMesh& mesh, const Skeleton& skeleton, 
   const Eigen::Vector3d low = skin.vertices.rowwise().minCoeff();
   const Eigen::Vector3d middle = 0.5 * (low + skin.vertices.rowwise().maxCoeff());
   // Lowest first; among equals the outermost, so that a symmetric sole gets symmetric points. Mirror images have one rank.
-  auto rank = [&](int v) {
-    const Eigen::Vector3d x = skin.vertices.col(v);
+  std::vector<std::tuple<long, long, long>> ranks;
+  for (const auto x : skin.vertices.colwise()) {
     const double grain = 1e-3 * spacing;
-    return std::tuple(std::lround((x[1] - low[1]) / grain), -std::lround(std::abs(x[0] - middle[0]) / grain),
-                      -std::lround(std::abs(x[2] - middle[2]) / grain));
-  };
+    ranks.emplace_back(std::lround((x[1] - low[1]) / grain), -std::lround(std::abs(x[0] - middle[0]) / grain),
+                       -std::lround(std::abs(x[2] - middle[2]) / grain));
+  }
+  const auto rank_of = [&ranks](int v) { return ranks[static_cast<std::size_t>(v)]; };
   std::vector<int> order(static_cast<std::size_t>(skin.vertices.cols()));
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return rank(a) < rank(b); });
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return rank_of(a) < rank_of(b); });
 
   std::vector<int> chosen;
   for (const int v : order) {
     const bool is_free = std::none_of(chosen.begin(), chosen.end(), [&](int other) {
-      const double least = (symmetric && rank(v) == rank(other) ? kImageSpacing : 1) * spacing;
+      const double least = (symmetric && rank_of(v) == rank_of(other) ? kImageSpacing : 1) * spacing;
       return (skin.vertices.col(v) - skin.vertices.col(other)).squaredNorm() < least * least &&
              !different_limbs(bones[v], bones[other]);
     });

@@ -1,5 +1,6 @@
 #include "retarget/mirror.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -32,24 +33,34 @@ std::vector<Eigen::Index> nearest_to_images(const Eigen::Matrix3Xd& points, cons
   return nearest;
 }
 
-}  // namespace
-
-std::optional<int> mirror_axis(const Motion& points, double length) {
+/// How far [m] a motion's points are off their images across an axis, RMS over points and frames.
+double off_images(const Motion& points, int axis) {
   Eigen::Matrix3Xd pose = Eigen::Matrix3Xd::Zero(3, points.frames.rows() / 3);  // the mean one: in a single frame feet may meet
   for (Eigen::Index f = 0; f < points.count(); ++f) pose += points.at(f).colwise() - points.at(f).rowwise().mean();
   pose /= static_cast<double>(points.count());
   std::vector<Eigen::Index> asked;
   for (Eigen::Index p = 0; p < pose.cols(); p += (pose.cols() + kMostAsked - 1) / kMostAsked) asked.push_back(p);
-  for (const int axis : {0, 2}) {
-    const std::vector<Eigen::Index> twins = nearest_to_images(pose, asked, axis);
-    double squared = 0;
-    for (Eigen::Index f = 0; f < points.count(); ++f) {
-      const Eigen::Matrix3Xd x = points.at(f), images = mirrored(x(Eigen::all, asked), axis, x.row(axis).mean());
-      squared += (x(Eigen::all, twins) - images).squaredNorm() / static_cast<double>(asked.size());
-    }
-    if (std::sqrt(squared / static_cast<double>(points.count())) < kMovesOffImage * length) return axis;
+  const std::vector<Eigen::Index> twins = nearest_to_images(pose, asked, axis);
+  double squared = 0;
+  for (Eigen::Index f = 0; f < points.count(); ++f) {
+    const Eigen::Matrix3Xd x = points.at(f), images = mirrored(x(Eigen::all, asked), axis, x.row(axis).mean());
+    squared += (x(Eigen::all, twins) - images).squaredNorm() / static_cast<double>(asked.size());
   }
-  return std::nullopt;
+  return std::sqrt(squared / static_cast<double>(points.count()));
+}
+
+}  // namespace
+
+std::optional<int> mirror_axis(const Motion& points, double length) {
+  const double off_x = off_images(points, 0), off_z = off_images(points, 2);
+  if (!(std::min(off_x, off_z) < kMovesOffImage * length)) return std::nullopt;
+  return off_z < off_x ? 2 : 0;
+}
+
+bool is_mirror_image(const Eigen::Matrix3Xd& pose, int axis, double length) {
+  Motion still;
+  still.frames = pose.reshaped();
+  return off_images(still, axis) < kMovesOffImage * length;
 }
 
 std::vector<std::array<int, 2>> mirrored_bones(const Eigen::Matrix3Xd& rest, const std::vector<int>& bone_of_point, double length) {

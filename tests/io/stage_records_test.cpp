@@ -52,7 +52,9 @@ TEST(StageRecords, GiveABodyOfElementsBackToTheBit) {
   for (const retarget::BoxCreature& box : retarget::element_box_creatures()) {
     retarget::Creature creature;
     creature.scene = box.scene;
+    creature.is_mirror_image = true;
     const auto read = result_of<retarget::Creature>(record_of(creature));
+    EXPECT_TRUE(read.is_mirror_image);
     ASSERT_EQ(read.scene.body.elements.size(), 1U);
     EXPECT_EQ(read.scene.body.elements[0].fit.of_element, box.scene.body.elements[0].fit.of_element);
     EXPECT_EQ(read.scene.body.elements[0].block.law, box.scene.body.elements[0].block.law);

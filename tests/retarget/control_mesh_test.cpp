@@ -247,6 +247,8 @@ TEST(BodyOptions, NameTheRuleTheyBreak) {
   EXPECT_EQ(broken_rule(BodyOptions{}), "");
   EXPECT_NE(broken_rule(BodyOptions{.nodes = 5}), "");
   EXPECT_NE(broken_rule(BodyOptions{.nodes = 100000}), "");
+  EXPECT_NE(broken_rule(BodyOptions{.mirror_axis = 1}), "");
+  EXPECT_EQ(broken_rule(BodyOptions{.mirror_axis = 2}), "");
   EXPECT_NE(broken_rule(BodyOptions{.lattice = {3, 0, 4}}), "");
   EXPECT_NE(broken_rule(BodyOptions{.least_fill = 0.9}), "");
 }

@@ -83,6 +83,39 @@ TEST(MakeCreature, HeightDecides) {
   EXPECT_TRUE(creature.warnings.empty());
 }
 
+/// A worm along z, or turned to lie along x, that lifts its head and lowers it again, and looks to one side by an angle [rad].
+Character nodding_worm(bool is_turned, double aside) {
+  Character character = worm();
+  const Eigen::AngleAxisd turn(is_turned ? M_PI / 2 : 0, Eigen::Vector3d::UnitY());
+  character.skin.vertices = turn.toRotationMatrix() * character.skin.vertices.eval();
+  for (Eigen::Affine3d& bone : character.skeleton.bind_pose) bone = turn * bone;
+  constexpr std::size_t kNeck = 8;
+  const Eigen::Translation3d neck(character.skeleton.bind_pose[kNeck].translation());
+  character.clip.rate_hz = character.clip.key_rate_hz = 60;
+  character.clip.duration_s = character.clip.range_s = 0.5;
+  for (int f = 0; f <= 30; ++f) {
+    const Eigen::AngleAxisd nod(0.4 * std::pow(std::sin(M_PI * f / 30), 2), turn * -Eigen::Vector3d::UnitX());
+    const Eigen::AngleAxisd look(aside, Eigen::Vector3d::UnitY());
+    std::vector<Eigen::Affine3d> pose = character.skeleton.bind_pose;
+    for (std::size_t b = kNeck; b < pose.size(); ++b) pose[b] = neck * look * nod * neck.inverse() * pose[b];
+    character.clip.bone_pose.push_back(pose);
+  }
+  return character;
+}
+
+TEST(MakeCreature, OfWhatIsItsOwnMirrorImageHasNoMiddleColumnOfCellsWhicheverWayItLies) {
+  for (const bool is_turned : {false, true}) {
+    CreatureOptions options;
+    options.nodes = 300;
+    const auto cells_across = [&](double aside) {
+      const Creature creature = make_creature(nodding_worm(is_turned, aside), options);
+      return creature.mesh.cell_places.row(is_turned ? 2 : 0).maxCoeff() + 1;
+    };
+    EXPECT_EQ(cells_across(0), 2);
+    EXPECT_EQ(cells_across(0.8), 3);
+  }
+}
+
 TEST(MakeCreature, TellsWhatIsItsOwnMirrorImageAllThroughALoop) {
   const auto is_mirror_image = [](const Character& character) { return make_creature(character, {}).is_mirror_image; };
   EXPECT_TRUE(is_mirror_image(block(1, {0, 0, 0}, 8)));

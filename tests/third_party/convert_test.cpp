@@ -137,7 +137,7 @@ TEST(ThirdPartyClips, TheFrogThatCannotHopSaysWhatStopsIt) {
   const fs::path file = assets() / "fbx/frog.fbx";
   if (!fs::exists(file)) GTEST_SKIP() << "left out: " << file << " is missing (set HYDROSTAT_ASSETS)";
   const TemporaryDirectory directory;
-  const Outcome outcome = hydrostat_in(directory.path, "convert " + in_quotes(file) + " -o creature --quiet --clip Frog_Jump --nodes 120");
+  const Outcome outcome = hydrostat_in(directory.path, "convert " + in_quotes(file) + " -o creature --quiet --clip Frog_Jump --nodes 170");
   EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
   const json report = report_of(directory.path / "creature");
   const std::string cause = report["replay"]["closed_loop"]["fall_cause"], warnings = report["warnings"].dump();

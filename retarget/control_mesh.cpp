@@ -61,7 +61,7 @@ std::string broken_rule(const BodyOptions& options) {
 ControlMesh build_control_mesh(const Skeleton& skeleton, const SkinnedMesh& skin, const BodyOptions& options) {
   refuse_empty(skin);
   constexpr int kFine = 10;
-  constexpr int kTries = 3, kMostTries = 8;
+  constexpr int kTries = 3, kMostTries = 8;  // of lattices; beyond the first only while a wished number is foreseen to be met better
   const TriangleSoup closed = with_closed_holes(skin.vertices, skin.triangles);
   std::vector<LatticeBody> lattices = options.lattice.isZero()
                                           ? ranked_lattices(skin, closed, options)

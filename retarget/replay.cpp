@@ -438,7 +438,7 @@ Replay Run::finish(long rows) {
   }
   result_.course = metrics_.course();
   if (options_.lesson) options_.lesson->cut(std::min<Eigen::Index>(rows - 1, options_.lesson->time_s.size()));
-  result_.motion.rate_hz = target_.rate_hz;
+  result_.motion.rate_hz = 1 / (static_cast<double>(steps_per_frame_) * control_s_);
   result_.motion.frames.resize(state_.x.size(), static_cast<Eigen::Index>(frames_.size()));
   for (std::size_t f = 0; f < frames_.size(); ++f) result_.motion.frames.col(static_cast<Eigen::Index>(f)) = frames_[f];
   if (options_.trace) shorten(result_.trace, rows);

@@ -52,7 +52,7 @@ struct ReplayCourse {
 };
 
 struct Replay {
-  Motion motion;          // nodes, at the target's rate
+  Motion motion;          // nodes, at the rate of control steps, or of every n-th, that is nearest to the target's
   ReplayReport report;
   ReplayCourse course;
   Trace trace;            // filled where asked

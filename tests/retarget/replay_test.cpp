@@ -150,6 +150,23 @@ TEST(Replay, ABodyBelowHalfItsHeightHasFallen) {
   EXPECT_LT(result.course.height[result.course.height.size() - 1], 0.5 * result.course.target_com(1, 0));
 }
 
+TEST(Replay, FramesLieAtTheTimesThatTheirRateTells) {
+  for (const double rate_hz : {24.0, 30.0, 42 / (17.0 / 24), 60.0, 61.3, 120.0, 240.0}) {
+    SCOPED_TRACE("a target of " + std::to_string(rate_hz) + " frames a second");
+    Actor actor;
+    actor.target.target.rate_hz = rate_hz;
+    const Replay result = replay(actor.input(), lasting(0.5, false));
+    const Motion& motion = result.motion;
+    EXPECT_NEAR(motion.rate_hz / std::min(rate_hz, 120.0), 1, 0.25);
+    ASSERT_NEAR(static_cast<double>(motion.count() - 1) / motion.rate_hz, 0.5, 1 / motion.rate_hz);
+    for (Eigen::Index f = 0; f < motion.count(); ++f) {
+      const double row = static_cast<double>(f) / motion.rate_hz / (result.trace.time_s[1] - result.trace.time_s[0]);
+      ASSERT_NEAR(row, std::round(row), 1e-6) << "frame " << f;
+      ASSERT_EQ(motion.frames.col(f), result.trace.position.col(std::lround(row))) << "frame " << f;
+    }
+  }
+}
+
 TEST(Replay, IsTheSameEveryTime) {
   const Actor actor;
   ReplayOptions options = lasting(0.4);

@@ -116,6 +116,7 @@ void fill(Group& group, const retarget::ReplayReport& replay) {
   group.add("travel_per_cycle_length", replay.travel_per_cycle_length);
   group.add("clip_travel_per_cycle_length", replay.clip_travel_per_cycle_length);
   group.add("slip_per_stance_length", replay.slip_per_stance_length);
+  group.add("held_slip_per_stance_length", replay.held_slip_per_stance_length);
   group.add("sole_gap_length", replay.sole_gap_length);
   group.add("penetration_max_size", replay.penetration_max_size);
   group.add("volume_error_max", replay.volume_error_max);
@@ -124,6 +125,7 @@ void fill(Group& group, const retarget::ReplayReport& replay) {
   group.add("external_assist_mg", replay.external_assist_mg);
   group.add("inverted_elements", replay.inverted_elements);
   group.add("guard_steps", replay.guard_steps);
+  group.add("feedback_rms", replay.feedback_rms);
   group.add("correction_rms", replay.correction_rms);
   group.add("correction_buzz_rms", replay.correction_buzz_rms);
   group.add("style_range", replay.style_range);

@@ -17,7 +17,7 @@ constexpr int kMostHalvings = 6;  // of euler's step where its solver finds no e
 ///
 /// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed
 /// shapes and keeps linear momentum. What angular momentum it loses in flight, a fault of its
-/// own, a turn of the whole body gives back, as far as the energy that it took away reaches; a turn about the centre of mass
+/// own, a turn of the whole body gives back (ImpulsesOf::correction_nodes), as far as the energy that it took away reaches; a turn about the centre of mass
 /// has no momentum, so that what is booked goes on to balance.
 /// Source: Dinev, Liu, Kavan, "Stabilizing integrators for real-time physics", TOG 37(1), 2018, section 4, whose measure of
 /// soundness is the energy, too.
@@ -96,8 +96,8 @@ class GuardedStepper final : public StepperOf<Dim> {
   }
 
   /// Adds the turn about the centre of mass that takes the angular momentum to what the start and the booked moments make
-  /// it, as far as the energy stays below the start's and the work.
-  void turn_on(const Eigen::VectorXd& activation, const ImpulsesOf<Dim>& impulses, StateOf<Dim>& state) {
+  /// it, as far as the energy stays below the start's and the work. It is booked as a correction.
+  void turn_on(const Eigen::VectorXd& activation, ImpulsesOf<Dim>& impulses, StateOf<Dim>& state) {
     const BodyOf<Dim>& body = scene_.body;
     const VectorOf<Dim> origin = VectorOf<Dim>::Zero(), centre = centre_of_mass(body, state.x);
     const SpinOf<Dim> missing = angular_momentum(body, start_.x, start_.v, origin) + impulses.gravity_moment +
@@ -110,7 +110,11 @@ class GuardedStepper final : public StepperOf<Dim> {
     // A part s of the turn brings in s b + s^2 a.
     const double a = 0.5 * rate.dot(missing), b = rate.dot(angular_momentum(body, state.x, state.v, centre));
     const double part = a + b <= spare ? 1 : 2 * spare / (b + std::sqrt(b * b + 4 * a * spare));
-    for (int i = 0; i < body.node_count(); ++i) state.v.col(i) += turning<Dim>(part * rate, state.x.col(i) - centre);
+    for (int i = 0; i < body.node_count(); ++i) {
+      const VectorOf<Dim> turn = turning<Dim>(part * rate, state.x.col(i) - centre);
+      state.v.col(i) += turn;
+      impulses.correction_nodes.col(i) += body.mass[i] * turn;
+    }
   }
 
   /// Of elastic forces [J]. Between staggered places and velocities it swings with every mode, up to fourfold near the bound of

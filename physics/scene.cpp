@@ -12,6 +12,7 @@ ImpulsesOf<Dim> make_impulses(const SceneOf<Dim>& scene) {
   impulses.effect_nodes.resize(Dim, scene.body.node_count());
   impulses.hold.resize(Dim, static_cast<Eigen::Index>(scene.body.held.size()));
   impulses.internal_nodes.resize(Dim, scene.self_contact.is_on ? scene.body.node_count() : 0);
+  impulses.correction_nodes.resize(Dim, scene.body.node_count());
   clear(impulses);
   return impulses;
 }
@@ -26,6 +27,7 @@ void clear(ImpulsesOf<Dim>& impulses) {
   impulses.gravity_moment.setZero();
   impulses.hold.setZero();
   impulses.internal_nodes.setZero();
+  impulses.correction_nodes.setZero();
   impulses.obstacle_work = 0;
 }
 
@@ -39,6 +41,7 @@ void add(const ImpulsesOf<Dim>& part, ImpulsesOf<Dim>& sum) {
   sum.gravity_moment += part.gravity_moment;
   sum.hold += part.hold;
   sum.internal_nodes += part.internal_nodes;
+  sum.correction_nodes += part.correction_nodes;
   sum.obstacle_work += part.obstacle_work;
 }
 

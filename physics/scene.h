@@ -48,6 +48,7 @@ struct ImpulsesOf {
   PointsOf<Dim> hold;                 // Dim x held nodes, by what holds them where they are
   PointsOf<Dim> internal_nodes = {};  // Dim x N, by the body's own surface: sums to zero and has no moment; empty without
                                       // self-contact
+  PointsOf<Dim> correction_nodes;     // Dim x N, by which the guard turns a body in flight: no force of the scene, an assist
   double obstacle_work = 0;  // [J] done on the body by obstacles that move and by what lifts it out of them and of itself
 };
 using Impulses = ImpulsesOf<3>;

@@ -62,14 +62,13 @@ std::vector<ContactState> point_states(const physics::Scene& scene, const physic
 PatchLoad patch_load(const physics::Scene& scene, const Patch& patch, const physics::State& state,
                      const Eigen::Matrix3Xd& impulse) {
   PatchLoad load;
-  Eigen::Vector3d moving = Eigen::Vector3d::Zero();
   for (const int p : patch.points) {
     const double normal = scene.ground.normal.dot(impulse.col(p));
-    moving += normal * level_velocity(scene, state, p);
+    load.speed += normal * level_velocity(scene, state, p).norm();
     load.normal_impulse += normal;
     load.gap = std::min(load.gap, height_above_ground(scene, state, p));
   }
-  if (load.normal_impulse > 0) load.speed = moving.norm() / load.normal_impulse;
+  load.speed = load.normal_impulse > 0 ? load.speed / load.normal_impulse : 0;
   return load;
 }
 

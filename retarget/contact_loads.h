@@ -32,7 +32,7 @@ std::vector<ContactState> point_states(const physics::Scene& scene, const physic
 /// The load on a patch.
 struct PatchLoad {
   double normal_impulse = 0;  // [N s]
-  double speed = 0;           // [m/s] along the ground, mean by load; 0 without
+  double speed = 0;           // [m/s] of its points along the ground, mean by load; 0 without
   double gap = 1e300;         // [m] of its lowest point above the ground
 };
 PatchLoad patch_load(const physics::Scene& scene, const Patch& patch, const physics::State& state,

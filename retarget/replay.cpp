@@ -21,6 +21,7 @@
 #include "retarget/replay_metrics.h"
 #include "retarget/return_map.h"
 #include "retarget/roll_brace.h"
+#include "retarget/slip_meter.h"
 #include "retarget/state_estimate.h"
 #include "retarget/strength_estimate.h"
 #include "retarget/stride_feedback.h"
@@ -97,6 +98,7 @@ class Run {
   physics::Termination advance();
   void write_trace(long row);
   void measure(long step);
+  void watch_for_fall();
   Replay finish(long rows);
 
   const ReplayInput& input_;
@@ -135,15 +137,18 @@ class Run {
   physics::State commanded_, before_;           // the path at the time of a command; before_: the last solver step of a control step
   RigidFit fit_;                                // from reference_ to state_
   Eigen::VectorXd activation_;                  // E, of a solver step
+  Eigen::VectorXd signals_;                     // E, of the time of activation_
   Eigen::VectorXd mean_activation_;             // E, of a control step
+  Eigen::VectorXd mean_feedback_;               // E, of that all that is not the signals
   Eigen::VectorXd feedback_;                    // E, what the corrector adds in this control step
   ContactNow contact_;
   physics::Impulses impulses_, step_impulses_;  // of a solver step, of a control step
   Eigen::Matrix3Xd effect_;                     // [N]
   const ContactThresholds thresholds_;
   ReplayMetrics metrics_;
+  SlipMeter slip_;
   FallWatch fall_watch_;
-  std::optional<Fall> fall_;
+  std::optional<Fall> falling_, fall_;
   std::vector<Eigen::VectorXd> frames_;  // of the motion
   Replay result_;
 };
@@ -177,6 +182,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
       state_(first_state(target_, curve_, path_)),
       activation_(input.scene.body.edge_count()),
       mean_activation_(activation_.size()),
+      mean_feedback_(activation_.size()),
       feedback_(Eigen::VectorXd::Zero(activation_.size())),
       contact_(planned_.first()),
       impulses_(physics::make_impulses(input.scene)),
@@ -184,6 +190,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
       effect_(3, input.scene.body.node_count()),
       thresholds_(contact_thresholds(input.scene, input.length, control_s_)),
       metrics_(input, control_s_, steps_, state_),
+      slip_(input.scene, input.prepared, input.length, options.step_s),
       frames_{column(state_.x)} {
   state_.obstacle_travel.setZero(3, static_cast<Eigen::Index>(plant_.obstacles.size()));
   if (!plant_.obstacles.empty()) uneven_.emplace(plant_, input.prepared, input.length, options.corrector.clearance);
@@ -333,6 +340,7 @@ void Run::control() {
 /// The activations of a time, but for the corrector's.
 void Run::command(double time_s) {
   input_.feed_forward(time_s, activation_);
+  signals_ = activation_;
   if (strength_) {
     curve_.at(time_s, commanded_.x, commanded_.v);
     path_.apply(time_s, commanded_);
@@ -354,6 +362,7 @@ void Run::activate(double share_of_step) {
 physics::Termination Run::advance() {
   physics::clear(step_impulses_);
   mean_activation_.setZero();
+  mean_feedback_.setZero();
   physics::Termination termination = physics::Termination::kDone;
   for (int k = 0; k < options_.steps_per_control; ++k) {
     const double begin = time_s_ + k * options_.step_s;
@@ -364,10 +373,12 @@ physics::Termination Run::advance() {
     if (moving_) move_obstacles(options_.moves, begin, options_.step_s, moving_->obstacles);
     activate((k + 0.5) / options_.steps_per_control);
     mean_activation_ += activation_ / options_.steps_per_control;
+    mean_feedback_ += (activation_ - signals_) / options_.steps_per_control;
     const bool looks = strength_ && k == options_.steps_per_control - 1;  // what feedback jerks has passed
     if (looks) before_ = state_;
     termination = stepper_->step(options_.step_s, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
     if (looks) strength_->look(options_.step_s, before_, state_, activation_, impulses_);
+    slip_.add(begin + options_.step_s, state_, impulses_.contact);
     physics::add(impulses_, step_impulses_);
     if (termination == physics::Termination::kDiverged) {
       time_s_ = begin;  // of the state that is left
@@ -386,6 +397,7 @@ void Run::write_trace(long row) {
   trace.activation.col(row) = mean_activation_;
   trace.contact_force.col(row) = column(step_impulses_.contact_nodes) / control_s_;
   trace.effect_force.col(row) = column(step_impulses_.effect_nodes) / control_s_;
+  trace.correction_impulse.col(row) = column(step_impulses_.correction_nodes);
   trace.contact_moment.col(row) = step_impulses_.contact_moment / control_s_;
   trace.effect_moment.col(row) = step_impulses_.effect_moment / control_s_;
 }
@@ -402,7 +414,16 @@ void Run::measure(long step) {
   if (options_.trace) write_trace(step);
   if (step % steps_per_frame_ == 0) frames_.emplace_back(column(state_.x));
   look_at_body();
-  metrics_.add({time_s_, state_, reference_, fit_, mean_activation_, correction_, step_impulses_, contact_.touching});
+  metrics_.add({time_s_, state_, reference_, fit_, mean_activation_, mean_feedback_, correction_, step_impulses_, contact_.touching});
+}
+
+/// A fall is told some time after it began; its cause is what was seen then.
+void Run::watch_for_fall() {
+  const bool was_falling = fall_watch_.seconds() > 0, has_fallen = fall_watch_.has_fallen(plant_.ground, fit_, control_s_);
+  if (!was_falling && fall_watch_.seconds() > 0) {
+    falling_ = Fall{time_s_ - fall_watch_.seconds(), fall_cause(input_, state_, reference_, fit_, activation_, time_s_)};
+  }
+  if (has_fallen) fall_ = falling_;
 }
 
 Replay Run::play() {
@@ -418,9 +439,7 @@ Replay Run::play() {
       break;
     }
     measure(step);
-    if (plant_.has_ground && fall_watch_.has_fallen(plant_.ground, fit_, control_s_)) {
-      fall_ = Fall{time_s_ - fall_watch_.seconds(), fall_cause(input_, state_, reference_, fit_, activation_, time_s_)};
-    }
+    if (plant_.has_ground) watch_for_fall();
   }
   return finish(step);
 }
@@ -429,6 +448,8 @@ Replay Run::play() {
 Replay Run::finish(long rows) {
   ReplayReport& report = result_.report;
   report = metrics_.figures();
+  report.slip_per_stance_length = slip_.per_stance() / input_.length;
+  report.held_slip_per_stance_length = slip_.held_per_stance() / input_.length;
   report.guard_steps = static_cast<int>(stepper_->guard_steps());
   report.real_time_factor = busy_s_ > 0 ? time_s_ / busy_s_ : 0;
   if (fall_) {

@@ -74,8 +74,7 @@ ReplayMetrics::ReplayMetrics(const ReplayInput& input, double control_s, long mo
       spin_(spin_of(input.scene.body, start)),
       course_(empty_course(most_steps, input.prepared.contacts.patches.size())),
       fast_(kBuzz, 1 / control_s, input.muscles.fields.cols()),
-      highest_(start_com_.y()),
-      patch_loaded_(input.prepared.contacts.patches.size(), false) {}
+      highest_(start_com_.y()) {}
 
 void ReplayMetrics::add(const ControlStep& step) {
   ++steps_;
@@ -97,6 +96,8 @@ void ReplayMetrics::balance_momentum(const ControlStep& step) {
       spin - spin_ - step.impulses.gravity_moment - step.impulses.contact_moment - step.impulses.effect_moment;
   report_.momentum_residual_mg = std::max(report_.momentum_residual_mg, change.norm() / control_s_ / weight_);
   report_.angular_residual_mgl = std::max(report_.angular_residual_mgl, turned.norm() / control_s_ / (weight_ * length_));
+  const double assist = step.impulses.correction_nodes.colwise().norm().sum();
+  report_.external_assist_mg = std::max(report_.external_assist_mg, assist / control_s_ / weight_);
   momentum_ = momentum;
   spin_ = spin;
 }
@@ -104,6 +105,7 @@ void ReplayMetrics::balance_momentum(const ControlStep& step) {
 void ReplayMetrics::compare_shape(const ControlStep& step) {
   shape_.add(step.fit.rms * step.fit.rms);
   world_.add(((step.state.x - step.reference.x).colwise().squaredNorm() * mass_shares_)(0));
+  feedback_.add(step.feedback.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, step.feedback.size())));
   const double muscles = static_cast<double>(std::max<Eigen::Index>(1, step.correction.size()));
   correction_.add(step.correction.squaredNorm() / muscles);
   buzz_.add(fast_.next(step.correction).squaredNorm() / muscles);
@@ -184,12 +186,7 @@ void ReplayMetrics::watch_patches(const ControlStep& step) {
   for (std::size_t k = 0; k < plan.patches.size(); ++k) {
     const PatchLoad load = patch_load(input_.scene, plan.patches[k], step.state, step.impulses.contact);
     const bool is_loaded = load.normal_impulse > thresholds_.patch_impulse;
-    if (is_loaded) {
-      slip_ += load.speed * control_s_;
-      if (!patch_loaded_[k]) ++stances_;
-      fastest = std::max(fastest, load.speed);
-    }
-    patch_loaded_[k] = is_loaded;
+    if (is_loaded) fastest = std::max(fastest, load.speed);
     const ContactState moving = load.speed > thresholds_.sliding_speed ? ContactState::kSlide : ContactState::kStick;
     course_.patch_state[k].push_back(is_loaded ? moving : ContactState::kOff);
     if (plan.state[k][frame] == ContactState::kStick && load.gap < kNothingBelow) sole_gap_.add(std::max(0.0, load.gap));
@@ -247,8 +244,8 @@ ReplayReport ReplayMetrics::figures() const {
   report.shape_rms_length = std::sqrt(shape_.value()) / length_;
   report.world_rms_length = std::sqrt(world_.value()) / length_;
   report.clip_shape_rms_length = std::sqrt(clip_shape_.value()) / length_;
-  report.slip_per_stance_length = slip_ / static_cast<double>(std::max(1L, stances_)) / length_;
   report.sole_gap_length = sole_gap_.value() / length_;
+  report.feedback_rms = std::sqrt(feedback_.value());
   report.correction_rms = std::sqrt(correction_.value());
   report.correction_buzz_rms = std::sqrt(buzz_.value());
   measure_drift(report);

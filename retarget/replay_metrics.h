@@ -16,12 +16,13 @@ struct ControlStep {
   const physics::State& reference;            // of the target
   const RigidFit& fit;                        // from target to body, by mass
   const Eigen::VectorXd& activation;          // E, as it was held
+  const Eigen::VectorXd& feedback;            // E, of that all that is not the signals
   const Eigen::VectorXd& correction;          // of the muscles, an activation each
   const physics::Impulses& impulses;          // of the whole step
   const std::vector<ContactState>& touching;  // P
 };
 
-/// What is measured of a replay while it runs. Keeps sums and courses; the report's figures stand in figures().
+/// What is measured of a replay while it runs, but for what slips. Keeps sums and courses; the report's figures stand in figures().
 class ReplayMetrics {
  public:
   /// Room for `most_steps` control steps of `control_s` [s]. The input must outlive this.
@@ -74,12 +75,10 @@ class ReplayMetrics {
   Eigen::Vector3d momentum_, spin_;  // at the end of the last step
   ReplayReport report_;              // largest values so far
   ReplayCourse course_;
-  Mean shape_, world_, clip_shape_, sole_gap_, correction_, buzz_;
+  Mean shape_, world_, clip_shape_, sole_gap_, feedback_, correction_, buzz_;
   signal::HighPass fast_;
   Range range_, clip_range_;  // of the skin within the body, as it lies in the clip's first frame
-  double slip_ = 0, highest_;
-  long stances_ = 0;
-  std::vector<bool> patch_loaded_;
+  double highest_;
   std::vector<double> cycle_, drift_, heading_;  // from the third cycle on
 };
 

@@ -49,11 +49,12 @@ struct ReplayReport {
   std::string fall_cause;
   double shape_rms_length = 0, clip_shape_rms_length = 0, world_rms_length = 0, drift_per_cycle_length = 0;
   double heading_deg_per_cycle = 0, travel_per_cycle_length = 0, clip_travel_per_cycle_length = 0;
-  double slip_per_stance_length = 0, sole_gap_length = 0, penetration_max_size = 0, volume_error_max = 0;
+  double slip_per_stance_length = 0, held_slip_per_stance_length = 0, sole_gap_length = 0, penetration_max_size = 0, volume_error_max = 0;
   double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
   int inverted_elements = 0;  // the most in any control step
   int guard_steps = 0;
-  double correction_rms = 0, correction_buzz_rms = 0;  // activations; what of them is faster than 10 Hz
+  double feedback_rms = 0;  // activations that are not the signals', of all constraints
+  double correction_rms = 0, correction_buzz_rms = 0;  // the corrector's of them, of muscles; what of these is faster than 10 Hz
   double style_range = 1, style_range_least = 1;       // how far the skin moves within the body over how far the clip's does
   double real_time_factor = 0;
   double apex_rise_length = 0, clip_apex_rise_length = 0;  // of the COM over its height at the start, per L

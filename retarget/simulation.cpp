@@ -255,6 +255,8 @@ void Course<Dim>::measure() {
                            physics::angular_momentum(body_, before_.x, before_.v, origin) - impulses_.contact_moment -
                            impulses_.effect_moment - hold_moment() - impulses_.gravity_moment;
   report.angular_residual_mgl = std::max(report.angular_residual_mgl, turn.norm() / (dt * weight_ * scenario_.length));
+  const double assist = impulses_.correction_nodes.colwise().norm().sum();
+  report.external_assist_mg = std::max(report.external_assist_mg, assist / (dt * weight_));
   report.energy_excess_mgl =
       std::max(report.energy_excess_mgl, (energy().sum() - energy_at_start_ - work_) / (weight_ * scenario_.length));
   report.volume_error_end = std::abs(physics::volume(body_, state_.x) / rest_volume_ - 1);

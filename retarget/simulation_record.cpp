@@ -40,7 +40,7 @@ SimulationRecord<Dim>::SimulationRecord(const ScenarioOf<Dim>& scenario, const S
   if (!options.trace) return;
   const long steps = std::max(1L, std::lround(options.duration_s / options.dt_s));
   trace_ = empty_trace(body, steps / options.steps_per_row + 1);
-  contact_ = effect_ = Eigen::VectorXd::Zero(3 * body.node_count());
+  contact_ = effect_ = correction_ = Eigen::VectorXd::Zero(3 * body.node_count());
   activation_ = Eigen::VectorXd::Zero(body.edge_count());
 }
 
@@ -68,6 +68,7 @@ void SimulationRecord<Dim>::add_step(const physics::ImpulsesOf<Dim>& impulses, c
   for (std::size_t n = 0; n < held.size(); ++n) effect.col(held[n]) += impulses.hold.col(static_cast<Eigen::Index>(n));
   contact_ += shares_of(impulses.contact_nodes);
   effect_ += shares_of(effect);
+  correction_ += shares_of(impulses.correction_nodes);
   contact_moment_ += impulses.contact_moment;
   effect_moment_ += impulses.effect_moment + hold_moment;
   activation_ += of_edges(activation);
@@ -90,12 +91,13 @@ void SimulationRecord<Dim>::write_row(double time_s, const physics::StateOf<Dim>
   const double seconds = steps_in_row_ * options_.dt_s;
   trace_.contact_force.col(row) = contact_ / seconds;
   trace_.effect_force.col(row) = effect_ / seconds;
+  trace_.correction_impulse.col(row) = correction_;
   const SpinOf<Dim> of_contact = contact_moment_ + physics::cross<Dim>(scenario_.origin, sum_of<Dim>(contact_));
   const SpinOf<Dim> of_effect = effect_moment_ + physics::cross<Dim>(scenario_.origin, sum_of<Dim>(effect_));
   trace_.contact_moment.col(row) = moment_of<Dim>(of_contact / seconds);
   trace_.effect_moment.col(row) = moment_of<Dim>(of_effect / seconds);
   trace_.activation.col(row) = activation_ / steps_in_row_;
-  for (Eigen::VectorXd* sum : {&contact_, &effect_, &activation_}) sum->setZero();
+  for (Eigen::VectorXd* sum : {&contact_, &effect_, &correction_, &activation_}) sum->setZero();
   contact_moment_.setZero();
   effect_moment_.setZero();
   steps_in_row_ = 0;

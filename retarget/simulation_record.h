@@ -47,7 +47,7 @@ class SimulationRecord {
   Trace trace_;
   Eigen::Index rows_ = 0;
   int steps_in_row_ = 0;
-  Eigen::VectorXd contact_, effect_;  // [N s] 3N, sums over a row
+  Eigen::VectorXd contact_, effect_, correction_;  // [N s] 3N, sums over a row
   physics::SpinOf<Dim> contact_moment_ = physics::SpinOf<Dim>::Zero(), effect_moment_ = physics::SpinOf<Dim>::Zero();
   Eigen::VectorXd activation_;
   std::vector<Eigen::VectorXd> frames_;

@@ -5,14 +5,14 @@ const kUnits = [
   ['_l0', 100, '% l0'], ['_mgl', 1, 'mgL'], ['_mg', 1, 'mg'], ['_deg_per_cycle', 1, 'deg'], ['_m_s', 1, 'm/s'], ['_kg', 1, 'kg'], ['_pa', 1, 'Pa'],
   ['_hz', 1, 'Hz'], ['_ms_per_sim_s', 1, 'ms/s'], ['_ms', 1, 'ms'], ['_time_factor', 1, '×'], ['_m', 1, 'm'], ['_s', 1, 's'],
 ];
-const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_end', 'volume_error_rms', 'correction_rms', 'correction_buzz_rms', 'style_range', 'style_range_least', 'work_saved']);
+const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volume_error_max', 'volume_error_end', 'volume_error_rms', 'feedback_rms', 'correction_rms', 'correction_buzz_rms', 'style_range', 'style_range_least', 'work_saved']);
 const kNames = {
   clip_shape_rms_length: 'shape against the imported clip', shape_rms_length: 'shape against the target',
   world_rms_length: 'position against the target', drift_per_cycle_length: 'drift a cycle', heading_deg_per_cycle: 'heading a cycle',
-  travel_per_cycle_length: 'travel a cycle', clip_travel_per_cycle_length: 'travel of the clip', slip_per_stance_length: 'slip a stance',
+  travel_per_cycle_length: 'travel a cycle', clip_travel_per_cycle_length: 'travel of the clip', slip_per_stance_length: 'slip a stance', held_slip_per_stance_length: 'of it, where the target holds',
   sole_gap_length: 'sole gap', penetration_max_size: 'deepest penetration', self_penetration_max_size: 'deepest in itself', volume_error_max: 'volume error, greatest',
   momentum_residual_mg: 'momentum unaccounted for', angular_residual_mgl: 'angular momentum unaccounted for',
-  external_assist_mg: 'assist from outside', correction_rms: 'correction', correction_buzz_rms: 'of it, faster than 10 Hz',
+  external_assist_mg: 'assist from outside', feedback_rms: 'all feedback', correction_rms: 'correction', correction_buzz_rms: 'of it, faster than 10 Hz',
   style_range: 'swing against the clip', style_range_least: 'swing of the stiffest limb', real_time_factor: 'speed over real time', duration_s: 'duration',
   fell: 'fell', fall_time_s: 'time of the fall', fall_cause: 'cause of the fall', apex_rise_length: 'highest rise of the COM',
   clip_apex_rise_length: 'highest rise in the clip', diverged_time_s: 'time at which it diverged', diverged_cause: 'what was seen then',

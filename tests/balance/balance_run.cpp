@@ -1,7 +1,9 @@
 // One free run of the balance bench: a creature, a variant of the corrector, a seed, a push; one row of balance.csv on standard output.
 // tests/balance/run.sh calls it for all of them. Usage: balance_run DIR VARIANT SEED PUSH CYCLES [FRAMES.json|- [SCENE.toml]]
 // SEED draws mass, friction and stiffness within 10 % of the plan and a shove of up to 0.1 m/s at the start; 0 is the plan itself.
-// PUSH is "none" or DIRECTION:PHASE:SPEED, the direction in eighths of a turn, the phase in quarters of a cycle, the speed in m/s.
+// PUSH is "none" or DIRECTION:PHASE:SPEED, the direction in eighths of a turn, the phase in quarters of the third cycle, or of what is played
+// once, the speed in m/s.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -22,7 +24,7 @@ namespace {
 
 constexpr double kVariation = 0.1;      // of mass, friction and stiffness
 constexpr double kFirstShove = 0.1;     // [m/s] at most
-constexpr double kPushCycle = 2;        // in which the push comes; seconds where a clip is played once
+constexpr double kPushCycle = 2;        // of a loop, in which the push comes; what is played once has but one
 constexpr int kEighths = 8, kQuarters = 4;
 
 /// The ground's slope [deg], rising towards -x turned by `side` [deg] about -y; the corrector's model stands on it, too.
@@ -87,14 +89,15 @@ retarget::Push shove(double time_s, double angle, double speed) {
   return push;
 }
 
-/// From "DIRECTION:PHASE:SPEED". `period_s` is a cycle's.
-retarget::Push parse_push(const std::string& text, double period_s) {
+/// From "DIRECTION:PHASE:SPEED".
+retarget::Push parse_push(const std::string& text, const retarget::Motion& target) {
   int direction = 0, phase = 0;
   double speed = 0;
   if (std::sscanf(text.c_str(), "%d:%d:%lf", &direction, &phase, &speed) != 3) {
     throw Error("balance_run", "PUSH", "'" + text + "' is not DIRECTION:PHASE:SPEED", "Write it like 2:1:0.5, or 'none'.");
   }
-  return shove((kPushCycle + static_cast<double>(phase) / kQuarters) * period_s, 2 * M_PI * direction / kEighths, speed);
+  const double cycles = (target.loop ? kPushCycle : 0) + static_cast<double>(phase) / kQuarters;
+  return shove(cycles * target.duration_s(), 2 * M_PI * direction / kEighths, speed);
 }
 
 /// Every third frame of the nodes, for the page's looping pictures.
@@ -150,14 +153,19 @@ int run(int argc, char** argv) {
   std::mt19937 random(of_shoves);
   const double angle = 2 * M_PI * static_cast<double>(random()) / 4294967296.0;
   if (seed != 0) options.replay.pushes.push_back(shove(0, angle, kFirstShove * static_cast<double>(random()) / 4294967296.0));
-  if (push != "none") options.replay.pushes.push_back(parse_push(push, target.loop ? target.duration_s() : 0.25));
+  if (push != "none") options.replay.pushes.push_back(parse_push(push, target));
   const auto& let_go = nodes > 0 ? retarget::perform_steadily : retarget::perform;
   const retarget::Replay replay = *let_go(performer, creature.signals, options).closed_loop;
   const retarget::ReplayReport& r = replay.report;
   const double travel = r.clip_travel_per_cycle_length > 0.01 ? r.travel_per_cycle_length / r.clip_travel_per_cycle_length : 1;
-  std::printf("%s,%d,%.4g,%.3f,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g\n", r.fell ? "fell" : "up", target.loop ? 1 : 0, r.cycles,
+  std::string cause = r.fall_cause;
+  std::replace(cause.begin(), cause.end(), ',', ';');
+  std::printf("%s,%d,%.4g,%.3f,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g,", r.fell ? "fell" : "up", target.loop ? 1 : 0, r.cycles,
               r.fell ? r.fall_time_s : r.duration_s, r.shape_rms_length, r.clip_shape_rms_length, r.drift_per_cycle_length,
               r.heading_deg_per_cycle, travel, r.slip_per_stance_length, r.penetration_max_size, r.real_time_factor);
+  std::printf("%.3g,%.3g,%.3g,%.3g,%d,%.3g,%.3g,%.3g,%.3g,%s\n", r.held_slip_per_stance_length, r.momentum_residual_mg,
+              r.angular_residual_mgl, r.external_assist_mg, r.guard_steps, r.feedback_rms, r.correction_buzz_rms, r.style_range,
+              r.style_range_least, cause.c_str());
   if (argc > 6 && argv[6] != std::string("-")) write_frames(argv[6], performer, replay.motion);
   return 0;
 }

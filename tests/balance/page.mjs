@@ -1,5 +1,5 @@
 // Writes DIR/balance.html from DIR/balance.csv and DIR/frames: a table of survival and medians, survival curves, looping pictures.
-// Prints the table as well; with a README, puts one of the usual variant between its marks. Usage: node page.mjs DIR [README.md]
+// Prints the table as well; with a README, puts one of the usual variant between its marks. Fails where a run had a hidden hand. Usage: node page.mjs DIR [README.md]
 import { existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { write_between_marks } from "../../samples/between_marks.mjs";
@@ -14,6 +14,7 @@ const median = (values) => {
   const middle = sorted.length >> 1;
   return sorted.length === 0 ? NaN : sorted.length % 2 ? sorted[middle] : (sorted[middle - 1] + sorted[middle]) / 2;
 };
+const most = (rows, name) => Math.max(...rows.map((row) => Number(row[name])));
 const grouped = new Map();
 for (const row of rows) {
   const key = `${row.clip},${row.variant}`;
@@ -21,7 +22,7 @@ for (const row of rows) {
   grouped.get(key)[row.push === "none" ? "seeds" : "pushes"].push(row);
 }
 const summary = [...grouped.values()].map(({ clip, variant, seeds, pushes }) => {
-  const of = (name) => median(seeds.filter((row) => row.outcome === "up").map((row) => row[name]));
+  const of = (name) => median(seeds.filter((row) => row.outcome === "up").map((row) => Math.abs(row[name])));
   return {
     clip,
     variant,
@@ -34,6 +35,13 @@ const summary = [...grouped.values()].map(({ clip, variant, seeds, pushes }) => 
     "heading deg": of("heading_deg"),
     travel: of("travel"),
     "slip %L": 100 * of("slip"),
+    "held slip %L": 100 * of("held_slip"),
+    "buzz": of("buzz"),
+    "style": of("style"),
+    "stiffest": of("style_least"),
+    "momentum unexplained, mg": most([...seeds, ...pushes], "momentum_mg"),
+    "angular, mgL": most([...seeds, ...pushes], "angular_mgl"),
+    "assist, mg": most([...seeds, ...pushes], "assist_mg"),
     "x real time": median(seeds.map((row) => row.real_time_factor)),
   };
 });
@@ -44,15 +52,15 @@ console.table(Object.fromEntries(summary.map(({ clip, variant, ...rest }) => [`$
 /** What a page for people wants of the usual variant; clips that fall have no medians of what stays up. */
 function readme_table() {
   const lines = summary.filter((row) => row.variant === "usual").map((row) => {
-    const cells = ["shape %L", "clip shape %L", "drift %L", "slip %L"].map((name) => Number.isNaN(row[name]) ? "-" : Math.abs(row[name]).toFixed(2));
+    const cells = ["shape %L", "clip shape %L", "drift %L", "slip %L", "held slip %L"].map((name) => Number.isNaN(row[name]) ? "-" : row[name].toFixed(2));
     const way = Number.isNaN(row.travel) ? "-" : `${(100 * row.travel).toFixed(0)} %`;
     const { seeds } = grouped.get(`${row.clip},${row.variant}`);
     const fallen = seeds.filter((one) => one.outcome !== "up").map((one) => Number(one.time_s));
     const falls = fallen.length === 0 ? "-" : `${Math.min(...fallen).toFixed(1)} to ${Math.max(...fallen).toFixed(1)} s`;
     return `| \`${row.clip}\` | ${row.up.replace("/", " of ")} | ${falls} | ${cells.join(" | ")} | ${way} | ${row.pushes.replace("/", " of ")} | ${row["x real time"].toFixed(1)} |`;
   });
-  return ["| clip | keeps its feet | falls at | from its plan, % L | from the clip, % L | drift a cycle, % L | slip a stance, % L | way | bears pushes | times real time |",
-          "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |", ...lines].join("\n");
+  return ["| clip | keeps its feet | falls at | from its plan, % L | from the clip, % L | drift a cycle, % L | slip a stance, % L | of it, where the target holds | way | bears pushes | times real time |",
+          "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |", ...lines].join("\n");
 }
 if (readme) write_between_marks(readme, "tests/balance/run.sh -r", readme_table());
 
@@ -128,3 +136,11 @@ for (const canvas of document.querySelectorAll("canvas")) {
 `;
 writeFileSync(join(directory, "balance.html.part"), page);
 renameSync(join(directory, "balance.html.part"), join(directory, "balance.html"));
+
+// No hidden hand: the ground, gravity and declared effects explain every change of momentum, and nothing else turned the body.
+const kUnexplained = 1e-6;
+const assisted = rows.filter((row) => Number(row.assist_mg) !== 0 || !(Number(row.momentum_mg) < kUnexplained && Number(row.angular_mgl) < kUnexplained));
+for (const row of assisted) {
+  console.error(`hidden hand in ${row.clip}, ${row.variant}, seed ${row.seed}, push ${row.push}: assist ${row.assist_mg} mg, unexplained ${row.momentum_mg} mg, ${row.angular_mgl} mgL`);
+}
+if (assisted.length > 0) process.exitCode = 1;

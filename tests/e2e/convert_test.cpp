@@ -62,9 +62,9 @@ const std::set<std::string> kReplayKeys{
     "cycles",           "duration_s",       "fell",           "fall_time_s",
     "fall_cause",       "shape_rms_length", "world_rms_length", "drift_per_cycle_length",
     "clip_shape_rms_length", "heading_deg_per_cycle", "travel_per_cycle_length", "clip_travel_per_cycle_length",
-    "slip_per_stance_length", "sole_gap_length", "penetration_max_size", "volume_error_max",
+    "slip_per_stance_length", "held_slip_per_stance_length", "sole_gap_length", "penetration_max_size", "volume_error_max",
     "momentum_residual_mg", "angular_residual_mgl", "external_assist_mg", "inverted_elements",
-    "guard_steps",      "correction_rms",   "real_time_factor"};
+    "guard_steps",      "correction_rms",   "feedback_rms", "real_time_factor"};
 
 void expect_contract(const fs::path& creature, bool stays_up) {
   std::set<std::string> files{"creature.toml", "appearance.bin", "body.json",   "target.bin", "signals.json",

@@ -145,6 +145,10 @@ TEST(Guard, KeepsTheAngularMomentumOfFreeFlightAndGainsNoEnergyByIt) {
       const SpinOf<2> spin = angular_momentum(body, before.x, before.v, VectorOf<2>::Zero());
       EXPECT_LT((angular_momentum(body, state.x, state.v, VectorOf<2>::Zero()) - spin).norm(), 1e-9 * spin.norm()) << k;
       EXPECT_LT(momentum_residual(scene, before, state, impulses, kDt), 1e-6) << k;
+      // What turned it is booked, and is a turn alone.
+      const PointsOf<2>& turn = impulses.correction_nodes;
+      EXPECT_GT(turn.norm(), 0) << k;
+      EXPECT_LT(turn.rowwise().sum().norm(), 1e-9 * turn.norm()) << k;
       const double energy_before = kinetic_energy(body, before.v) + forces.elastic_energy(before.x);
       EXPECT_LT(kinetic_energy(body, state.v) + forces.elastic_energy(state.x), (1 + 1e-12) * energy_before) << k;
     }

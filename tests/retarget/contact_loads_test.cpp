@@ -51,6 +51,21 @@ TEST(PatchLoads, AddUpToTheWeight) {
   EXPECT_NEAR(sum, standing.creature.mass() * 9.81 * kStep, 1e-9);
 }
 
+TEST(PatchLoads, APatchThatTurnsOnTheSpotMoves) {
+  Standing standing;
+  const Patch patch = always_standing(standing.creature, 1).patches[0];
+  const physics::ContactPoints& points = standing.creature.scene.contact_points;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const int p : patch.points) middle += points.of(standing.state.x, p) / static_cast<double>(patch.points.size());
+  double mean = 0;
+  for (const int p : patch.points) mean += (points.of(standing.state.x, p) - middle).norm() / static_cast<double>(patch.points.size());
+  ASSERT_GT(mean, 0);
+  for (Eigen::Index i = 0; i < standing.state.x.cols(); ++i) {
+    standing.state.v.col(i) = Eigen::Vector3d(0, 2, 0).cross(Eigen::Vector3d(standing.state.x.col(i) - middle));
+  }
+  EXPECT_NEAR(standing.patch(0).speed, 2 * mean, 0.01 * mean);
+}
+
 TEST(PatchLoads, MoveAsTheirLoadedPointsDo) {
   Standing standing;
   const Patch patch = always_standing(standing.creature, 1).patches[0];

@@ -42,7 +42,7 @@ class Measured {
         impulses.contact_nodes.col(creature.scene.contact_points.nodes(k, p)) += creature.scene.contact_points.weights(k, p) * impulses.contact.col(p);
       }
     }
-    metrics_.add({steps_ * kStep, state, target_state_, fit, activation, correction, impulses, touching});
+    metrics_.add({steps_ * kStep, state, target_state_, fit, activation, feedback, correction, impulses, touching});
   }
   ReplayReport figures() const { return metrics_.figures(); }
   ReplayCourse course() const { return metrics_.course(); }
@@ -51,6 +51,7 @@ class Measured {
   physics::State state{creature.scene.body.rest, Eigen::Matrix3Xd::Zero(3, creature.scene.body.node_count())};
   physics::Impulses impulses = physics::make_impulses(creature.scene);
   Eigen::VectorXd activation = Eigen::VectorXd::Ones(creature.scene.body.edge_count());
+  Eigen::VectorXd feedback = Eigen::VectorXd::Zero(creature.scene.body.edge_count());
   Eigen::VectorXd correction =
       Eigen::VectorXd::Zero(make_muscles(creature.scene.body, creature.skeleton, creature.bone_weights).fields.cols());
 
@@ -136,19 +137,6 @@ TEST(ReplayMetrics, AnElementThatInvertsForOneStepIsNotForgotten) {
     EXPECT_GT(most, 0);
     EXPECT_EQ(run.figures().inverted_elements, most);
   }
-}
-
-TEST(ReplayMetrics, SlipIsTheWayOfLoadedPatchesAlone) {
-  Measured run;
-  for (int k = 0; k < 12; ++k) {
-    run.state.v.row(0).setConstant(k < 6 ? 0.5 : 0);
-    run.step();
-  }
-  EXPECT_NEAR(run.figures().slip_per_stance_length, 6 * kStep * 0.5 / BoxCreature::kLength, 1e-12);
-  run.impulses.contact.setZero();
-  run.state.v.row(0).setConstant(5);
-  for (int k = 0; k < 12; ++k) run.step();
-  EXPECT_NEAR(run.figures().slip_per_stance_length, 6 * kStep * 0.5 / BoxCreature::kLength, 1e-12);
 }
 
 TEST(ReplayMetrics, AForceThatIsNotBookedIsSeen) {

@@ -120,6 +120,8 @@ TEST(Replay, AHardShoveIsAFallAndIsTold) {
   EXPECT_LT(result.report.duration_s, 2);
   EXPECT_NE(result.report.fall_cause.find("limb '"), std::string::npos) << result.report.fall_cause;
   EXPECT_NE(result.report.fall_cause.find("limit"), std::string::npos);
+  ASSERT_EQ(result.report.fall_cause.find("at "), 0U);
+  EXPECT_NEAR(std::stod(result.report.fall_cause.substr(3)), result.report.fall_time_s, 0.02) << "the cause is that of the fall's beginning";
   EXPECT_EQ(result.trace.count(), result.course.time_s.size() + 1);  // nothing is written of what was not simulated
 }
 

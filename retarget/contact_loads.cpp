@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace hydrostat::retarget {
 namespace {
@@ -66,10 +67,15 @@ PatchLoad patch_load(const physics::Scene& scene, const Patch& patch, const phys
     const double normal = scene.ground.normal.dot(impulse.col(p));
     load.speed += normal * level_velocity(scene, state, p).norm();
     load.normal_impulse += normal;
-    load.gap = std::min(load.gap, height_above_ground(scene, state, p));
   }
   load.speed = load.normal_impulse > 0 ? load.speed / load.normal_impulse : 0;
   return load;
+}
+
+double patch_height(const physics::Scene& scene, const Patch& patch, const physics::State& state) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const int p : patch.points) lowest = std::min(lowest, height_above_ground(scene, state, p));
+  return lowest;
 }
 
 }  // namespace hydrostat::retarget

@@ -33,9 +33,11 @@ std::vector<ContactState> point_states(const physics::Scene& scene, const physic
 struct PatchLoad {
   double normal_impulse = 0;  // [N s]
   double speed = 0;           // [m/s] of its points along the ground, mean by load; 0 without
-  double gap = 1e300;         // [m] of its lowest point above the ground
 };
 PatchLoad patch_load(const physics::Scene& scene, const Patch& patch, const physics::State& state,
                      const Eigen::Matrix3Xd& impulse);
+
+/// Height [m] of a patch's lowest point, as height_above_ground has it.
+double patch_height(const physics::Scene& scene, const Patch& patch, const physics::State& state);
 
 }  // namespace hydrostat::retarget

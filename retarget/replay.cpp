@@ -413,7 +413,6 @@ void Run::look_at_body() {
 void Run::measure(long step) {
   if (options_.trace) write_trace(step);
   if (step % steps_per_frame_ == 0) frames_.emplace_back(column(state_.x));
-  look_at_body();
   metrics_.add({time_s_, state_, reference_, fit_, mean_activation_, mean_feedback_, correction_, step_impulses_, contact_.touching});
 }
 
@@ -432,6 +431,7 @@ Replay Run::play() {
     const double began = thread_seconds();
     control();
     result_.termination = advance();
+    if (result_.termination == physics::Termination::kDone) look_at_body();
     busy_s_ += thread_seconds() - began;
     if (result_.termination == physics::Termination::kDiverged) {
       fall_ = Fall{time_s_, "the simulation diverged: " +

@@ -189,7 +189,9 @@ void ReplayMetrics::watch_patches(const ControlStep& step) {
     if (is_loaded) fastest = std::max(fastest, load.speed);
     const ContactState moving = load.speed > thresholds_.sliding_speed ? ContactState::kSlide : ContactState::kStick;
     course_.patch_state[k].push_back(is_loaded ? moving : ContactState::kOff);
-    if (plan.state[k][frame] == ContactState::kStick && load.gap < kNothingBelow) sole_gap_.add(std::max(0.0, load.gap));
+    if (plan.state[k][frame] != ContactState::kStick) continue;
+    const double gap = patch_height(input_.scene, plan.patches[k], step.state);
+    if (gap < kNothingBelow) sole_gap_.add(std::max(0.0, gap));
   }
   course_.slip_speed[steps_ - 1] = fastest;
 }

@@ -117,6 +117,38 @@ TEST(FindShift, CountsWhatWasShiftedBefore) {
   }
 }
 
+TEST(FindShift, MovesTheLoadToTheEndThatMustHold) {
+  // One end is dragged away from the other, whose friction holds by a share of the sliding one's: it has to bear so much more, 1 / 1.3 of
+  // the weight. Even with the loads at the edges of the soles that leaves the centre of mass too near to the sliding end, by 0.06 m.
+  constexpr double kShare = 0.3, kNeeded = 0.06;
+  const BoxCreature creature = make_box_creature();
+  const Motion motion = standing(creature, 12);
+  for (const double end : {1.0, -1.0}) {
+    SCOPED_TRACE(end > 0 ? "the front is dragged" : "the back is dragged");
+    ContactSchedule contacts = always_standing(creature, 12);
+    for (std::size_t k = 0; k < contacts.patches.size(); ++k) {
+      if ((contacts.patches[k].name.find("front") == 0) != (end > 0)) continue;
+      contacts.state[k].assign(12, ContactState::kSlide);
+      contacts.sliding_x.row(static_cast<Eigen::Index>(k)).setConstant(end);
+    }
+    const double before = missing_wrench(motion, creature.scene, contacts, BoxCreature::kLength, kShare).colwise().norm().maxCoeff();
+    Shift so_far;
+    Motion moved = motion;
+    for (int round = 0; round < 6; ++round) {
+      const Shift shift = find_shift(moved, creature.scene, contacts, BoxCreature::kLength, kShare, 60, {}, so_far);
+      add(shift, so_far);
+      moved = leaned(creature, moved, shift);
+    }
+    const double after = missing_wrench(moved, creature.scene, contacts, BoxCreature::kLength, kShare).colwise().norm().maxCoeff();
+    const Eigen::VectorXd shares = creature.scene.body.mass / creature.mass();
+    const double way = -end * ((moved.at(0) - motion.at(0)) * shares).x();
+    EXPECT_GT(before, 0.1);
+    EXPECT_LT(after, 0.05 * before);
+    EXPECT_GT(way, 0.9 * kNeeded);
+    EXPECT_LT(way, 2 * kNeeded);
+  }
+}
+
 /// A box that comes down on its four soles and stops within a frame; it lands in frame `landing` with `speed` [m/s].
 Motion dropped(const BoxCreature& creature, Eigen::Index frames, Eigen::Index landing, double speed) {
   return played(creature, frames, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {

@@ -206,12 +206,12 @@ void name_fields(RecordArchive& archive, retarget::ReplayReport& report) {
                  report.fall_time_s, "fall_cause", report.fall_cause, "shape", report.shape_rms_length, "clip_shape",
                  report.clip_shape_rms_length, "world", report.world_rms_length, "drift", report.drift_per_cycle_length,
                  "heading", report.heading_deg_per_cycle, "travel", report.travel_per_cycle_length, "clip_travel",
-                 report.clip_travel_per_cycle_length, "slip", report.slip_per_stance_length, "held_slip", report.held_slip_per_stance_length, "sole_gap",
-                 report.sole_gap_length, "penetration", report.penetration_max_size, "volume_error", report.volume_error_max,
+                 report.clip_travel_per_cycle_length, "slip", report.slip_per_stance_length, "held_slip",
+                 report.held_slip_per_stance_length, "sole_gap", report.sole_gap_length, "penetration", report.penetration_max_size, "volume_error", report.volume_error_max,
                  "momentum_residual", report.momentum_residual_mg, "angular_residual", report.angular_residual_mgl,
                  "external_assist", report.external_assist_mg, "inverted_elements", report.inverted_elements, "guard_steps",
-                 report.guard_steps, "feedback", report.feedback_rms, "correction", report.correction_rms, "correction_buzz", report.correction_buzz_rms, "style_range",
-                 report.style_range, "style_range_least", report.style_range_least, "real_time_factor", report.real_time_factor,
+                 report.guard_steps, "feedback", report.feedback_rms, "correction", report.correction_rms, "correction_buzz",
+                 report.correction_buzz_rms, "style_range", report.style_range, "style_range_least", report.style_range_least, "real_time_factor", report.real_time_factor,
                  "apex_rise", report.apex_rise_length, "clip_apex_rise", report.clip_apex_rise_length);
 }
 

@@ -17,8 +17,8 @@ constexpr int kMostHalvings = 6;  // of euler's step where its solver finds no e
 ///
 /// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed
 /// shapes and keeps linear momentum. What angular momentum it loses in flight, a fault of its
-/// own, a turn of the whole body gives back (ImpulsesOf::correction_nodes), as far as the energy that it took away reaches; a turn about the centre of mass
-/// has no momentum, so that what is booked goes on to balance.
+/// own, a turn of the whole body gives back (ImpulsesOf::correction_nodes), as far as the energy that it took away reaches; a
+/// turn about the centre of mass has no momentum, so that what is booked goes on to balance.
 /// Source: Dinev, Liu, Kavan, "Stabilizing integrators for real-time physics", TOG 37(1), 2018, section 4, whose measure of
 /// soundness is the energy, too.
 template <int Dim>

@@ -378,12 +378,12 @@ physics::Termination Run::advance() {
     if (looks) before_ = state_;
     termination = stepper_->step(options_.step_s, activation_, has_effect ? &effect_ : nullptr, state_, impulses_);
     if (looks) strength_->look(options_.step_s, before_, state_, activation_, impulses_);
-    slip_.add(begin + options_.step_s, state_, impulses_.contact);
     physics::add(impulses_, step_impulses_);
     if (termination == physics::Termination::kDiverged) {
       time_s_ = begin;  // of the state that is left
       return termination;
     }
+    slip_.add(begin + options_.step_s, state_, impulses_.contact);
   }
   time_s_ += control_s_;
   return termination;
@@ -413,7 +413,8 @@ void Run::look_at_body() {
 void Run::measure(long step) {
   if (options_.trace) write_trace(step);
   if (step % steps_per_frame_ == 0) frames_.emplace_back(column(state_.x));
-  metrics_.add({time_s_, state_, reference_, fit_, mean_activation_, mean_feedback_, correction_, step_impulses_, contact_.touching});
+  metrics_.add(
+      {time_s_, state_, reference_, fit_, mean_activation_, mean_feedback_, correction_, step_impulses_, contact_.touching});
 }
 
 /// A fall is told some time after it began; its cause is what was seen then.

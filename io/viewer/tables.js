@@ -9,7 +9,8 @@ const kShares = new Set(['saturated', 'max_strain', 'p95_strain', 'limit', 'volu
 const kNames = {
   clip_shape_rms_length: 'shape against the imported clip', shape_rms_length: 'shape against the target',
   world_rms_length: 'position against the target', drift_per_cycle_length: 'drift a cycle', heading_deg_per_cycle: 'heading a cycle',
-  travel_per_cycle_length: 'travel a cycle', clip_travel_per_cycle_length: 'travel of the clip', slip_per_stance_length: 'slip a stance', held_slip_per_stance_length: 'of it, where the target holds',
+  travel_per_cycle_length: 'travel a cycle', clip_travel_per_cycle_length: 'travel of the clip', slip_per_stance_length: 'slip a stance',
+  held_slip_per_stance_length: 'of it, where the target holds',
   sole_gap_length: 'sole gap', penetration_max_size: 'deepest penetration', self_penetration_max_size: 'deepest in itself', volume_error_max: 'volume error, greatest',
   momentum_residual_mg: 'momentum unaccounted for', angular_residual_mgl: 'angular momentum unaccounted for',
   external_assist_mg: 'assist from outside', feedback_rms: 'all feedback', correction_rms: 'correction', correction_buzz_rms: 'of it, faster than 10 Hz',

@@ -135,6 +135,7 @@ TEST(Replay, WhereNoStepLeadsOnThatIsToldAndNoLimb) {
     const Replay result = replay(actor.input(), options);
     EXPECT_EQ(result.termination, physics::Termination::kDiverged);
     EXPECT_NEAR(result.report.fall_time_s, 0.1, options.step_s);
+    EXPECT_TRUE(std::isfinite(result.report.slip_per_stance_length));
     const std::string& cause = result.report.fall_cause;
     EXPECT_TRUE(cause.starts_with("the simulation diverged: at 0.")) << cause;
     for (const std::string& words : {"by the method '" + physics::name_of(method) + "' led to a finite state", std::string(" m/s and 0 elements were inverted")})

@@ -216,7 +216,8 @@ void support_what_does_not_fall(const Eigen::VectorXd& middle, const Sights& sig
 
 bool is_dragged(const ContactSchedule& contacts) {
   const auto slides = [](const std::vector<ContactState>& states) {
-    return std::find(states.begin(), states.end(), ContactState::kSlide) != states.end();
+    const std::vector<ContactState> twice(2, ContactState::kSlide);
+    return std::search(states.begin(), states.end(), twice.begin(), twice.end()) != states.end();
   };
   return std::any_of(contacts.state.begin(), contacts.state.end(), slides);
 }

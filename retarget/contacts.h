@@ -29,7 +29,7 @@ struct ContactSchedule {
   double flight_s(double rate_hz) const;  // frames without any contact
 };
 
-/// Whether the plan lets a patch slide that bears load.
+/// Whether the plan drags what bears load: some patch slides for two frames or more, for a foot that lands slides for one.
 bool is_dragged(const ContactSchedule& contacts);
 
 struct ContactOptions {

@@ -8,30 +8,25 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kLeap = 0.05;     // [s] in the air: less is a flicker of contacts
-constexpr double kLanding = 0.07;  // [s] from the flight to the last foot that lands
 constexpr double kFeetOfLeaps = 1.0 / 8, kMomentumOfHops = 0.5;  // of the rows' usual weights
 constexpr double kEffortOfHops = 3.2, kNodesOfHops = 3, kHorizonOfHops = 1.5;  // times the usual
 
 /// Frame f of a loop may lie a period on or before.
 std::size_t wrapped(long f, long frames) { return static_cast<std::size_t>(((f % frames) + frames) % frames); }
 
-/// Whether patch k begins to stick in frame f and comes out of a flight.
-bool lands(const ContactSchedule& contacts, const std::vector<bool>& flying, std::size_t k, long f, long landing, bool loop) {
-  const long frames = static_cast<long>(flying.size());
-  const std::vector<ContactState>& states = contacts.state[k];
-  if (!loop && f == 0) return false;
-  if (states[wrapped(f, frames)] != ContactState::kStick || states[wrapped(f - 1, frames)] != ContactState::kOff) return false;
-  for (long d = 1; d <= landing && (loop || d <= f); ++d) {
-    if (flying[wrapped(f - d, frames)]) return true;
-  }
-  return false;
-}
-
 /// What touches and where it stands, before any stance is lengthened.
 struct Stances {
   ContactSchedule contacts;
   std::vector<std::vector<Hold>> holds;
 };
+
+/// Of the points' mean way along the ground, from the frame before to the one after; zero where they stay.
+Eigen::Vector2d direction_of(const Motion& points, const std::vector<int>& own, Eigen::Index frame) {
+  const Eigen::VectorXd velocity = velocities(points).col(frame);
+  Eigen::Vector2d way = Eigen::Vector2d::Zero();
+  for (const int p : own) way += Eigen::Vector2d(velocity[3 * p], velocity[3 * p + 2]);
+  return way.norm() > 0 ? way.normalized() : way;
+}
 
 /// Lets patch k, which touches in frame f, touch in the `frames` after it, or before it where that is negative, as far as it was off
 /// the ground there, on the place of frame f.
@@ -44,7 +39,12 @@ void lengthen(const Stances& before, const Motion& points, std::size_t k, long f
     if (!points.loop && (h < 0 || h >= count)) break;
     const std::size_t g = wrapped(h, count);
     if (contacts.state[k][g] != ContactState::kOff) break;
-    contacts.state[k][g] = ContactState::kStick;
+    contacts.state[k][g] = frames < 0 ? ContactState::kSlide : ContactState::kStick;
+    if (frames < 0) {
+      const Eigen::Vector2d way = direction_of(points, own, static_cast<Eigen::Index>(g));
+      contacts.sliding_x(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(g)) = way.x();
+      contacts.sliding_z(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(g)) = way.y();
+    }
     for (const int p : own) contacts.touching(p, static_cast<Eigen::Index>(g)) = before.contacts.touching(p, f);
     for (Hold hold : before.holds[static_cast<std::size_t>(f)]) {
       if (std::find(own.begin(), own.end(), hold.point) == own.end()) continue;
@@ -83,17 +83,6 @@ void prolong_stances(const Motion& points, long frames, ContactSchedule& contact
       if (before.contacts.state[k][static_cast<std::size_t>(f)] != ContactState::kStick) continue;
       lengthen(before, points, k, f, -frames, contacts, holds);
       lengthen(before, points, k, f, frames, contacts, holds);
-    }
-  }
-}
-
-void reach_out(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds) {
-  const Stances before{contacts, holds};
-  const std::vector<bool> flying = frames_in_flight(contacts, points.rate_hz, points.loop);
-  const long count = points.count(), landing = std::lround(kLanding * points.rate_hz);
-  for (std::size_t k = 0; k < before.contacts.patches.size(); ++k) {
-    for (long f = 0; f < count; ++f) {
-      if (lands(before.contacts, flying, k, f, landing, points.loop)) lengthen(before, points, k, f, -frames, contacts, holds);
     }
   }
 }

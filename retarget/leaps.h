@@ -12,14 +12,10 @@ namespace hydrostat::retarget {
 std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_hz, bool loop);
 
 /// Lets every stance last `frames` longer at both ends, as far as its patch was off the ground there, on the place on which it stands:
-/// what pushes off later and lands earlier flies for a shorter time, and lower. `points` is the motion of the contact
+/// what pushes off later and lands earlier flies for a shorter time, and lower. A foot that comes down still moves, and friction brakes it
+/// as much as it can: in the frames before its stance it slides, the way that it came. `points` is the motion of the contact
 /// points, `holds` are find_holds' of `contacts`; both grow by those frames.
 void prolong_stances(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds);
-
-/// Lets every stance that comes out of a flight begin `frames` earlier, on the place on which it will stand: feet that reach out bring
-/// a body to rest over a longer way than feet that come down with it. Patches that stick within 0.07 s after the flight are taken for
-/// those that land. `contacts` and `holds` grow as prolong_stances' do.
-void reach_out(const Motion& points, long frames, ContactSchedule& contacts, std::vector<std::vector<Hold>>& holds);
 
 /// Whether a patch that is off the ground in a frame, or in the midst of a stance, touches next without a flight before: patches x F. What
 /// is to fly first is no foot that could step under the body. All true where nothing flies.

@@ -27,7 +27,6 @@ constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of co
 constexpr ShiftCosts kLeapCosts{0.12, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
 constexpr double kLeapFriction = 1.05;  // times the usual share of friction: it is moved less
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
-constexpr double kReachOut = 1.0 / 60;  // [s] that its feet come down still earlier
 constexpr double kReachInFlight = 0.065;  // strain that its shape is held back less where nothing bears,
 constexpr double kClearOfGround[] = {1.0 / 60, 0.1};  // [s] from the last contact on and until so long before the next
 constexpr double kSpreadShift = 0.15;   // share of the usual cost of the shift where load is spread
@@ -209,7 +208,6 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   if (is_far_leap) {
     result.support_friction *= kLeapFriction;
     prolong_stances(points, std::lround(kLonger * points.rate_hz), contacts, holds);
-    reach_out(points, std::max(1L, std::lround(kReachOut * points.rate_hz)), contacts, holds);
     set_feet();
     mark();
   }

@@ -14,7 +14,7 @@ CorrectorOptions gain_of(bool has_legs, double effort, bool slides = true) {
   const Motion motion = standing(creature, 6);
   PreparedTarget target = as_prepared(motion, always_standing(creature, motion.count()));
   for (Patch& patch : target.contacts.patches) patch.on_leg = has_legs;
-  if (slides) target.contacts.state[0][2] = ContactState::kSlide;
+  if (slides) target.contacts.state[0][2] = target.contacts.state[0][3] = ContactState::kSlide;
   CorrectorOptions options;
   options.effort = effort;
   return gain_on_path({creature.scene, creature.scene, target, muscles, {}, motion, creature.scene.contact_points}, options);

@@ -54,7 +54,7 @@ TEST(ReferenceGlide, GivesWayAtOnceWhereThePlanDragsTheBody) {
   const Motion motion = bobbing(creature, 20, 0.3);
   PreparedTarget plan = as_prepared(motion, always_standing(creature, motion.count()));
   const ReferenceGlide stands = glide_for(plan, 0.3, 1);
-  plan.contacts.state[0][7] = ContactState::kSlide;  // one frame of one patch
+  plan.contacts.state[0][7] = plan.contacts.state[0][8] = ContactState::kSlide;  // two frames of one patch
   const ReferenceGlide dragged = glide_for(plan, 0.3, 1);
   EXPECT_EQ(dragged.reach, make_glide(0, 0.3, 1).reach);
   EXPECT_GT(stands.reach, 2 * dragged.reach);

@@ -23,6 +23,7 @@
 #include "retarget/flight.h"
 #include "retarget/leaps.h"
 #include "retarget/prepare_standing.h"
+#include "retarget/rest_lengths.h"
 #include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
 
@@ -31,6 +32,8 @@ namespace hydrostat::cli {
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr double kWorthFitting = 0.1;  // of the springs: fewer are not what fells a body
 
 /// What the body depends on: this program and what was read, wherever its bytes lie (a glTF file may have them beside it).
 std::string key_of(const io::ImportedCharacter& imported) {
@@ -76,7 +79,38 @@ void Conversion::solve(const io::ImportedCharacter& imported, double wished_limi
 
 void Conversion::stay_up(const io::ImportedCharacter& imported, double wished_limit) {
   perform_within_error();
-  if (!is_down(performances_.main())) return;
+  if (performances_.lapse != retarget::Lapse::kNothing) fit_rest_lengths(imported, wished_limit);
+  if (is_down(performances_.main())) spread_load(imported, wished_limit);
+}
+
+void Conversion::fit_rest_lengths(const io::ImportedCharacter& imported, double wished_limit) {
+  const double share = retarget::share_overstrained(target_.performer.prepared.target, creature_.scene.body);
+  if (share < kWorthFitting) return;
+  stages_.run("rest_lengths", [&] {
+    Progress silent(std::cerr, ProgressStyle::silent);
+    Stages stages = stages_beside("fitted", silent);
+    retarget::CreatureOptions settings = settings_;
+    settings.fitted_rest_lengths = true;
+    const std::unique_ptr<Conversion> fitted = solved_by(settings, imported, wished_limit, stages);
+    if (!fitted) return 0;
+    fitted->perform();
+    const auto straying = [](const Conversion& of) {
+      return retarget::straying(of.target_.performer, of.perform_options().replay, of.performances_.main());
+    };
+    if (!(straying(*fitted) < retarget::kBetter * straying(*this))) return 0;
+    const char* const lapse = performances_.lapse == retarget::Lapse::kFell ? "falls" : "loses the clip's way";
+    take_over(*fitted);
+    char text[300];
+    std::snprintf(text, sizeof text,
+                  "the creature %s with the rest lengths of its bind pose, for the clip takes %.0f %% of its constraints more than %.0f %% from them: "
+                  "these get the middle of their lengths in the clip, and it strays less than half as far",
+                  lapse, 100 * share, 100 * retarget::kMostSpringStrain);
+    add_warnings({text});
+    return 0;
+  });
+}
+
+void Conversion::spread_load(const io::ImportedCharacter& imported, double wished_limit) {
   stages_.run("spread_load", [&] {
     Progress silent(std::cerr, ProgressStyle::silent);
     Stages stages = stages_beside("spread", silent);
@@ -119,11 +153,12 @@ void Conversion::find_activations(double wished_limit) {
   key_ = key_after(key_, options_.friction, settings_.firmness, std::int64_t{settings_.spread_load});
   retarget::PreparedTarget prepared = stages_.run("preparation", key_, [&] { return prepared_target(creature_, motion_, settings_); });
   retarget::fit_body(prepared, creature_.scene.body);
+  if (settings_.fitted_rest_lengths) retarget::fit_rest_lengths(prepared.target, creature_.scene.body);
   creature_.youngs_modulus *= prepared.stiffness;
   retarget::InverseOptions inverse_options;
   inverse_options.limit = wished_limit;
   inverse_options.threads = options_.threads;
-  key_ = key_after(key_, wished_limit);
+  key_ = key_after(key_, wished_limit, std::int64_t{settings_.fitted_rest_lengths});
   inverse_ = stages_.run("inverse_dynamics", key_, [&] {
     const auto& solve = wished_limit > 0 ? retarget::solve_inverse_dynamics : retarget::solve_within_automatic_limit;
     return solve(prepared, scene, creature_.length, inverse_options);

@@ -28,9 +28,14 @@ class Conversion {
   const retarget::RunReport& report() const { return target_.report; }
 
  private:
-  /// Lets it go, and where it falls prepares and solves it again with its load spread wider (PrepareOptions), which is kept if it
-  /// stays up by that.
+  /// Lets it go, and where it falls or loses its way tries what may keep it up and on it.
   void stay_up(const io::ImportedCharacter& imported, double wished_limit);
+
+  /// Solved again from rest lengths that the clip's are nearer to, where many are far from them; kept if it strays less than half as far.
+  void fit_rest_lengths(const io::ImportedCharacter& imported, double wished_limit);
+
+  /// Prepared and solved again with its load spread wider (PrepareOptions); kept if it stays up by that.
+  void spread_load(const io::ImportedCharacter& imported, double wished_limit);
 
   /// Solved by other settings; none where the clip cannot be solved by them.
   std::unique_ptr<Conversion> solved_by(const retarget::CreatureOptions& settings, const io::ImportedCharacter& imported, double wished_limit,

@@ -61,6 +61,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
                      {"wobble", options.wobble},
                      {"polish", options.polish},
                      {"firmness", performer.prepared.firmness},
+                     {"rest_lengths", std::string(settings.fitted_rest_lengths ? "fitted" : "usual")},
                      {"load", std::string(settings.spread_load ? "spread" : "usual")},
                      {"seed", std::int64_t{options.seed}}};
   for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);

@@ -25,6 +25,7 @@ struct CreatureOptions {
   double limit = 0;            // of |activation - 1|; 0: automatic
   double firmness = 1;         // of the preparation, as is the next, see PrepareOptions
   bool spread_load = false;
+  bool fitted_rest_lengths = false;  // of springs, see fit_rest_lengths
   double density = 1000;       // [kg/m3]
   double softness = 0.005;     // rho g L / E
   bool hexahedra = false;      // the lattice's cells are the elements, not the tets they are cut into: not of springs

@@ -3,6 +3,7 @@
 #include "retarget/level_signals.h"
 #include "retarget/level_target.h"
 #include "retarget/mesh_places.h"
+#include "retarget/rest_lengths.h"
 #include "retarget/sag.h"
 #include "retarget/self_contact_plan.h"
 
@@ -59,6 +60,7 @@ Level at_level(const Performer& solved, const SignalSet& signals, const Rig& rig
   performer.muscles = make_muscles(creature.scene.body, rig.skeleton, creature.mesh.bone_weights);
   performer.prepared = carried_target(solved, rig, creature);
   stiffen(performer.prepared.stiffness, performer.scene.body);
+  if (has_fitted_rest_lengths(solved.scene.body)) fit_rest_lengths(performer.prepared.target, performer.scene.body);
   performer.path = carried_path(solved, rig, performer, creature.mesh.bone_weights);
   performer.clip_points = carried_clip_points(solved, creature.contacts);
   SelfContactPlan plan = plan_self_contact(performer);

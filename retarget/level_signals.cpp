@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "retarget/inverse_dynamics.h"
+#include "retarget/rest_lengths.h"
 #include "retarget/tensor_field.h"
 
 namespace hydrostat::retarget {
@@ -24,14 +25,16 @@ Eigen::MatrixXd edge_lengths(const physics::Body& body, const Motion& target) {
 }
 
 /// What of activations adds up along each constraint, so that a uniform strain is a field of tensors: of springs, which are at
-/// rest where their activation is the stretch, F^T F along the constraint is its square; of elements the logarithms fit that of U,
-/// F = R U (physics/element_activation.h).
+/// rest where their activation, from the rest length that they have, is the stretch, F^T F along the constraint is its square; of elements
+/// the logarithms fit that of U, F = R U (physics/element_activation.h).
 Eigen::MatrixXd measures_of(const physics::Body& body, const Eigen::MatrixXd& activation) {
-  return body.elements.empty() ? activation.cwiseAbs2().eval() : activation.array().log().matrix().eval();
+  if (!body.elements.empty()) return activation.array().log();
+  return (natural_stretch(body).asDiagonal() * activation).cwiseAbs2();
 }
 
 Eigen::MatrixXd activations_of(const physics::Body& body, const Eigen::MatrixXd& measures) {
-  return body.elements.empty() ? measures.cwiseMax(kLeastSquare).cwiseSqrt().eval() : measures.array().exp().matrix().eval();
+  if (!body.elements.empty()) return measures.array().exp();
+  return natural_stretch(body).cwiseInverse().asDiagonal() * measures.cwiseMax(kLeastSquare).cwiseSqrt();
 }
 
 /// How fast measures grow with a body's activations, where these are 1.

@@ -29,7 +29,6 @@ constexpr Feedback kOthers[] = {{},
                                 {.effort = 4, .horizon = 1, .root_weight = 1},
                                 {.effort = 16, .horizon = 1, .root_weight = 1},
                                 {.effort = 64, .horizon = 1, .root_weight = 1}};
-constexpr double kBetter = 0.5;  // share of the straying that another gain is worth its while from
 
 using FeedForward = std::function<void(double, Eigen::VectorXd&)>;
 
@@ -72,20 +71,6 @@ bool is_as_planned(const Performer& performer, const ReplayOptions& options) {
   const Eigen::Vector3d& gravity = performer.scene.gravity;
   const bool is_level = gravity.x() == 0 && gravity.z() == 0;
   return is_level && !performer.world.is_told() && performer.scene.obstacles.empty() && options.pushes.empty();
-}
-
-/// How far a run is off the clip's way, in units of what loses it; without end where it is down.
-double straying(const Performer& performer, const ReplayOptions& options, const Replay& run) {
-  const ReplayReport& report = run.report;
-  const Motion& target = performer.prepared.target;
-  const double way = report.clip_travel_per_cycle_length;
-  if (report.fell || run.termination != physics::Termination::kDone) return HUGE_VAL;
-  if (!is_as_planned(performer, options) || way < kLeastTravel || report.cycles < 1 - 1e-6) return 0;
-  const bool turns = std::abs(target.yaw) * report.cycles > kCircle;
-  const bool tells_drift = !target.loop || report.cycles > kLeastCycles - 1e-6;
-  const double travel = turns ? 0 : std::abs(report.travel_per_cycle_length - way) / (kOffTravel * way);
-  const double drift = tells_drift ? report.drift_per_cycle_length / (kOffDrift * way) : 0;
-  return std::max(travel, drift);
 }
 
 /// Whether one of kTrials stays up, by the options' feedback.
@@ -152,6 +137,19 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
       run(performer, plant, signals_of(signals), signals.limit, main, &performer.path);
   beside.get();
   return result;
+}
+
+double straying(const Performer& performer, const ReplayOptions& options, const Replay& run) {
+  const ReplayReport& report = run.report;
+  const Motion& target = performer.prepared.target;
+  const double way = report.clip_travel_per_cycle_length;
+  if (report.fell || run.termination != physics::Termination::kDone) return HUGE_VAL;
+  if (!is_as_planned(performer, options) || way < kLeastTravel || report.cycles < 1 - 1e-6) return 0;
+  const bool turns = std::abs(target.yaw) * report.cycles > kCircle;
+  const bool tells_drift = !target.loop || report.cycles > kLeastCycles - 1e-6;
+  const double travel = turns ? 0 : std::abs(report.travel_per_cycle_length - way) / (kOffTravel * way);
+  const double drift = tells_drift ? report.drift_per_cycle_length / (kOffDrift * way) : 0;
+  return std::max(travel, drift);
 }
 
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run) {

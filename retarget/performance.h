@@ -91,6 +91,10 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 /// options. The signals play from their coefficients with all layers. The corrector's model knows of no obstacles.
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
+/// How far a run is off the clip's way, in units of what loses it (lapse_of); infinite where it is down.
+double straying(const Performer& performer, const ReplayOptions& options, const Replay& run);
+constexpr double kBetter = 0.5;  // share of the straying that anything but the usual is worth its while from
+
 /// Whether it fell or diverged, or lost its way: travels by over 8 % of the clip's travel more or less than that, or drifts by over 4 % of
 /// it a cycle (of a loop of four cycles or more). Only what travels has a way to lose, over level ground and undisturbed, without scene or push, for a
 /// cycle at least; of a loop that turns its drift alone counts.

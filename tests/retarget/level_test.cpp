@@ -14,6 +14,7 @@
 #include "retarget/inverse_dynamics.h"
 #include "retarget/level_cost.h"
 #include "retarget/level_target.h"
+#include "retarget/rest_lengths.h"
 #include "retarget/sag.h"
 #include "retarget/step_cost.h"
 #include "retarget/tensor_field.h"
@@ -259,6 +260,34 @@ TEST(AtLevel, FeelsWhatWasDoneToTheSolvedSignals) {
     const Eigen::VectorXd change = after.cwiseAbs2() - played(plain).cwiseAbs2();
     for (int e = 0; e < of_level.edge_count(); ++e) EXPECT_NEAR(change[e], along(of_level, e), 1e-4) << "seed " << seed << ", constraint " << e;
   }
+}
+
+// A creature whose rest lengths were fitted to what its clip pulls far apart: levels get theirs likewise, and are without stress where it is.
+TEST(AtLevel, CarriesAStretchBeyondWhatSpringsBearByRestLengthsOfItsOwn) {
+  const double longer = 1.8, across = 1 / std::sqrt(longer);
+  const Eigen::Matrix3d deform = Eigen::Vector3d(longer, across, across).asDiagonal();
+  Solved solved = floating_block(90, deform);
+  const auto wanted_by = [&deform](const physics::Body& body) {
+    return Eigen::RowVectorXd(stress_free(body, deform).array() / natural_stretch(body).transpose().array());
+  };
+  const auto want = [&](double share) {
+    set_signals(share * wanted_by(solved.performer.scene.body), solved);
+    solved.signals.limit = kMostSpringStrain;
+  };
+  want(1);
+  const auto level = [&solved] { return at_level(solved.performer, solved.signals, solved.rig, options_for(kSanitized ? 40 : 200, false)); };
+  EXPECT_FALSE(has_fitted_rest_lengths(level().performer.scene.body));
+  physics::Body& body = solved.performer.scene.body;
+  fit_rest_lengths(solved.performer.prepared.target, body);
+  ASSERT_TRUE(has_fitted_rest_lengths(body));
+  want(1);
+  const Level fitted = level();
+  const physics::Body& of_level = fitted.performer.scene.body;
+  EXPECT_TRUE(has_fitted_rest_lengths(of_level));
+  EXPECT_LT((played(fitted).transpose() - wanted_by(of_level)).cwiseAbs().maxCoeff(), 1e-5);
+  // And an edit is the same strain there, whatever the rest lengths: of 1 % along every constraint.
+  want(1.01);
+  EXPECT_LT((played(level()).transpose().array() / wanted_by(of_level).array() - 1.01).abs().maxCoeff(), 2e-3);
 }
 
 // A level of finite elements reads logarithms where springs have squares: the same small strain is half of it there.

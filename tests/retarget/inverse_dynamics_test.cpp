@@ -5,9 +5,11 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <string>
 
 #include "tests/retarget/box_creature.h"
+#include "tests/sanitizers.h"
 
 namespace hydrostat::retarget::inverse_dynamics_test {
 namespace {
@@ -260,6 +262,39 @@ TEST(InverseDynamics, MoreWeightOnTheShapeIsPaidWithMiss) {
     }
     last = miss;
   }
+}
+
+/// Processor time [s] of the whole process.
+double process_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+// A clip four times as long takes four times as long: its frames are coupled by sweeps alone, never by one system of all of them, which would
+// take sixteen times as long and more. Other work on the machine only adds to a time, so that the least of three counts.
+TEST(InverseDynamics, TakeTimeInProportionToTheFrames) {
+  if (kSanitized) return;
+  const BoxCreature creature = make_box_creature();
+  InverseOptions options;
+  options.threads = 1;
+  const auto swaying = [&creature](Eigen::Index frames) {
+    Motion motion = standing(creature, frames);
+    for (Eigen::Index f = 0; f < frames; ++f) {
+      const double share = 0.05 * std::sin(2 * M_PI * static_cast<double>(f) / 12);
+      const Eigen::Matrix3Xd rest = motion.at(f);
+      for (Eigen::Index i = 0; i < rest.cols(); ++i) motion.at(f).col(i) = stretched(rest.col(i), share);
+    }
+    return motion;
+  };
+  const Motion few = swaying(24), many = swaying(96);
+  double of_few = 1e300, of_many = 1e300;
+  for (int run = 0; run < 3; ++run) {
+    const double start = process_seconds();
+    solve_standing(creature, few, options);
+    const double between = process_seconds();
+    solve_standing(creature, many, options);
+    of_few = std::min(of_few, between - start);
+    of_many = std::min(of_many, process_seconds() - between);
+  }
+  EXPECT_GT(of_many / of_few, 2.5);
+  EXPECT_LT(of_many / of_few, 6);
 }
 
 TEST(AutomaticLimit, IsThe99thPercentileWithinItsBounds) {

@@ -83,52 +83,53 @@ void Conversion::stay_up(const io::ImportedCharacter& imported, double wished_li
   if (is_down(performances_.main())) spread_load(imported, wished_limit);
 }
 
-void Conversion::fit_rest_lengths(const io::ImportedCharacter& imported, double wished_limit) {
-  const double share = retarget::share_overstrained(target_.performer.prepared.target, creature_.scene.body);
-  if (share < kWorthFitting) return;
-  stages_.run("rest_lengths", [&] {
+void Conversion::try_by(const std::string& stage, const retarget::CreatureOptions& settings, const io::ImportedCharacter& imported,
+                        double wished_limit, const std::function<std::string(const Conversion&)>& why_better) {
+  stages_.run(stage, [&] {
     Progress silent(std::cerr, ProgressStyle::silent);
-    Stages stages = stages_beside("fitted", silent);
-    retarget::CreatureOptions settings = settings_;
-    settings.fitted_rest_lengths = true;
-    const std::unique_ptr<Conversion> fitted = solved_by(settings, imported, wished_limit, stages);
-    if (!fitted) return 0;
-    fitted->perform();
-    const auto straying = [](const Conversion& of) {
-      return retarget::straying(of.target_.performer, of.perform_options().replay, of.performances_.main());
-    };
-    if (!(straying(*fitted) < retarget::kBetter * straying(*this))) return 0;
-    const char* const lapse = performances_.lapse == retarget::Lapse::kFell ? "falls" : "loses the clip's way";
-    take_over(*fitted);
-    char text[300];
-    std::snprintf(text, sizeof text,
-                  "the creature %s with the rest lengths of its bind pose, for the clip takes %.0f %% of its constraints more than %.0f %% from them: "
-                  "these get the middle of their lengths in the clip, and it strays less than half as far",
-                  lapse, 100 * share, 100 * retarget::kMostSpringStrain);
-    add_warnings({text});
+    Stages stages = stages_beside(stage, silent);
+    const std::unique_ptr<Conversion> other = solved_by(settings, imported, wished_limit, stages);
+    if (!other) return 0;
+    other->perform();
+    const std::string why = why_better(*other);
+    if (why.empty()) return 0;
+    take_over(*other);
+    add_warnings({why});
     return 0;
   });
 }
 
+double Conversion::straying() const {
+  return retarget::straying(target_.performer, perform_options().replay, performances_.main());
+}
+
+void Conversion::fit_rest_lengths(const io::ImportedCharacter& imported, double wished_limit) {
+  const double share = retarget::share_overstrained(target_.performer.prepared.target, creature_.scene.body);
+  if (share < kWorthFitting) return;
+  retarget::CreatureOptions settings = settings_;
+  settings.fitted_rest_lengths = true;
+  try_by("rest_lengths", settings, imported, wished_limit, [&](const Conversion& fitted) -> std::string {
+    if (!(fitted.straying() < retarget::kBetter * straying())) return "";
+    char text[300];
+    std::snprintf(text, sizeof text,
+                  "the creature %s with the rest lengths of its bind pose, for the clip takes %.0f %% of its constraints more than %.0f %% from them: "
+                  "these get the middle of their lengths in the clip, and it strays less than half as far",
+                  performances_.lapse == retarget::Lapse::kFell ? "falls" : "loses the clip's way", 100 * share, 100 * retarget::kMostSpringStrain);
+    return text;
+  });
+}
+
 void Conversion::spread_load(const io::ImportedCharacter& imported, double wished_limit) {
-  stages_.run("spread_load", [&] {
-    Progress silent(std::cerr, ProgressStyle::silent);
-    Stages stages = stages_beside("spread", silent);
-    retarget::CreatureOptions settings = settings_;
-    settings.spread_load = true;
-    const std::unique_ptr<Conversion> spread = solved_by(settings, imported, wished_limit, stages);
-    if (!spread) return 0;
-    spread->perform();
-    if (is_down(spread->performances_.main())) return 0;
-    const double usual_shift = target_.report.preparation.total_shift_rms_length;
-    take_over(*spread);
+  retarget::CreatureOptions settings = settings_;
+  settings.spread_load = true;
+  try_by("spread_load", settings, imported, wished_limit, [&](const Conversion& spread) -> std::string {
+    if (is_down(spread.performances_.main())) return "";
     char text[300];
     std::snprintf(text, sizeof text,
                   "the creature falls by the usual preparation, which moves the clip by %.1f %% L: it is moved by %.1f %% L, which spreads its load over "
                   "more of what bears it, and stays up",
-                  100 * usual_shift, 100 * target_.report.preparation.total_shift_rms_length);
-    add_warnings({text});
-    return 0;
+                  100 * target_.report.preparation.total_shift_rms_length, 100 * spread.target_.report.preparation.total_shift_rms_length);
+    return text;
   });
 }
 

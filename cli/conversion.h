@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,13 @@ class Conversion {
  private:
   /// Lets it go, and where it falls or loses its way tries what may keep it up and on it.
   void stay_up(const io::ImportedCharacter& imported, double wished_limit);
+
+  /// Solved and let go by other settings, which is kept where `why_better` has a warning that tells why; stage and cache have one name.
+  void try_by(const std::string& stage, const retarget::CreatureOptions& settings, const io::ImportedCharacter& imported, double wished_limit,
+              const std::function<std::string(const Conversion&)>& why_better);
+
+  /// How far it is off the clip's way, see retarget::straying.
+  double straying() const;
 
   /// Solved again from rest lengths that the clip's are nearer to, where many are far from them; kept if it strays less than half as far.
   void fit_rest_lengths(const io::ImportedCharacter& imported, double wished_limit);

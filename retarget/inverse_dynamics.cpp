@@ -17,7 +17,7 @@ constexpr double kTie = 10;  // weight of the rows that tie y to the residual fo
 constexpr int kFirstRounds = 6,
               kLaterRounds = 1;         // of linearising the forces of elements, in the first sweep and in those after it
 constexpr double kSettled = 0.01;       // change of an activation that ends the rounds
-constexpr double kLeastLimit = 0.1, kMostLimit = 0.4;  // of |activation - 1|, where it is chosen
+constexpr double kLeastLimit = 0.1;  // of |activation - 1|, where it is chosen
 constexpr double kShapeShare = 0.99;    // of the target's strains that the limit holds,
 constexpr double kMostHeld = 0.03;      // share of the activations that it may hold
 constexpr double kWiden = 1.5;          // times as wide where it holds more
@@ -198,7 +198,7 @@ double automatic_limit(const physics::Body& body, const Motion& target) {
   }
   const auto place = strains.begin() + static_cast<long>(kShapeShare * static_cast<double>(strains.size() - 1));
   std::nth_element(strains.begin(), place, strains.end());
-  return std::clamp(*place, kLeastLimit, kMostLimit);
+  return std::clamp(*place, kLeastLimit, kMostAutomaticLimit);
 }
 
 InverseDynamics solve_inverse_dynamics(const PreparedTarget& prepared, const physics::Scene& scene, double length,
@@ -298,8 +298,8 @@ InverseDynamics solve_within_automatic_limit(const PreparedTarget& prepared, con
   within.limit = automatic_limit(scene.body, prepared.target);
   for (;;) {
     InverseDynamics inverse = solve_inverse_dynamics(prepared, scene, length, within);
-    if (inverse.report.saturated <= kMostHeld || within.limit >= kMostLimit) return inverse;
-    within.limit = std::min(kMostLimit, kWiden * within.limit);
+    if (inverse.report.saturated <= kMostHeld || within.limit >= kMostAutomaticLimit) return inverse;
+    within.limit = std::min(kMostAutomaticLimit, kWiden * within.limit);
   }
 }
 

@@ -22,7 +22,9 @@ struct InverseDynamics {
   InverseReport report;
 };
 
-/// The 99th percentile of the target's constraint strain, at least 0.1, at most 0.4.
+constexpr double kMostAutomaticLimit = 0.4;  // of |activation - 1|
+
+/// The 99th percentile of the target's constraint strain, at least 0.1, at most kMostAutomaticLimit.
 double automatic_limit(const physics::Body& body, const Motion& target);
 
 /// Solves, per frame, min |sqrt(M) Ts^2 A^-1 (rho - B u - J^T Gc alpha)|^2 + eps |u - u_kin|^2 + eps_s |u''|^2 within

@@ -1,12 +1,12 @@
 #pragma once
 
 #include "physics/body.h"
-#include "retarget/motion.h"
+#include "retarget/inverse_dynamics.h"
 
 namespace hydrostat::retarget {
 
-/// Strain [-] beyond which a spring is taken too far for its muscle, whose limit is no more where it is chosen.
-constexpr double kMostSpringStrain = 0.4;
+/// Strain [-] beyond which a spring is taken too far for its muscle: it can follow no further where its limit is chosen for it.
+constexpr double kMostSpringStrain = kMostAutomaticLimit;
 
 /// Share of the springs that a target takes too far; 0 of finite elements.
 double share_overstrained(const Motion& target, const physics::Body& body);

@@ -11,14 +11,18 @@ namespace {
 constexpr std::size_t kUsualStages = 32;  // up to which nothing is allocated later
 
 template <int Dim>
-Lanes lanes_of(const PointsOf<Dim>& points, int column) {
-  const double* const at = points.col(column).data();
+Lanes lanes_of(const double* at) {
   return Lanes(Lanes::Vector{at[0], at[1], Dim == 3 ? at[Dim - 1] : 0.0, 0.0});
 }
 
-/// Scalar products of four pairs.
+/// Scalar products of four pairs, each summed as by sum_of: four at once by six permutations and three sums.
 inline Lanes products(const Lanes (&a)[Lanes::kCount], const Lanes (&b)[Lanes::kCount]) {
-  return Lanes(Lanes::Vector{sum_of(a[0] * b[0]), sum_of(a[1] * b[1]), sum_of(a[2] * b[2]), sum_of(a[3] * b[3])});
+  using Order = long long __attribute__((vector_size(sizeof(Lanes))));
+  constexpr Order kEven{0, 4, 2, 6}, kOdd{1, 5, 3, 7}, kFirst{0, 1, 4, 5}, kLast{2, 3, 6, 7};
+  const Lanes::Vector p[] = {a[0].value * b[0].value, a[1].value * b[1].value, a[2].value * b[2].value, a[3].value * b[3].value};
+  const Lanes::Vector low = __builtin_shuffle(p[0], p[1], kEven) + __builtin_shuffle(p[0], p[1], kOdd);
+  const Lanes::Vector high = __builtin_shuffle(p[2], p[3], kEven) + __builtin_shuffle(p[2], p[3], kOdd);
+  return Lanes(__builtin_shuffle(low, high, kFirst) + __builtin_shuffle(low, high, kLast));
 }
 
 }  // namespace
@@ -45,7 +49,7 @@ DashpotStages<Dim>::DashpotStages(const BodyOf<Dim>& body)
     damping_.push_back(0);
   }
   along_.resize(edges_.size());
-  turning_.resize(edges_.size());
+  turning_.resize(edges_.size() / Lanes::kCount);
   most_at_rest_ = most_at_a_node(body.rest);
 }
 
@@ -110,10 +114,8 @@ void DashpotStages<Dim>::set_edges(double h) {
     const Lanes across = products(rate, rate) - along * along / squared;
     const Lanes turning = where_positive(squared, root * across / sqrt(1.0 + (0.25 * h * h) * across / squared), Lanes(0.0));
     root = where_positive(squared, root, Lanes(0.0));  // without a length no direction
-    for (int k = 0; k < Lanes::kCount; ++k) {
-      along_[e + static_cast<std::size_t>(k)] = Lanes(root[k]) * span[k];
-      turning_[e + static_cast<std::size_t>(k)] = turning[k];
-    }
+    for (int k = 0; k < Lanes::kCount; ++k) along_[e + static_cast<std::size_t>(k)] = Lanes(root[k]) * span[k];
+    turning_[e / Lanes::kCount] = turning;
   }
 }
 
@@ -121,69 +123,84 @@ void DashpotStages<Dim>::set_edges(double h) {
 template <int Dim>
 void DashpotStages<Dim>::add_forces(double time) {
   Node* const nodes = nodes_.data();
-  for (std::size_t e = 0; e < edges_.size(); ++e) {
-    Node &low = nodes[edges_[e].low], &high = nodes[edges_[e].high];
-    const Lanes pull = (sum_of((high.velocity - low.velocity) * along_[e]) + time * turning_[e]) * along_[e];
-    low.force += pull;
-    high.force -= pull;
+  const Ends* const ends = edges_.data();
+  const Lanes since(time);
+  for (std::size_t e = 0; e < edges_.size(); e += Lanes::kCount) {
+    const Ends* const four = ends + e;
+    const Lanes* const turning = turning_.data() + e / Lanes::kCount;
+    Lanes rate[Lanes::kCount], along[Lanes::kCount];
+    for (int k = 0; k < Lanes::kCount; ++k) {
+      rate[k].value = nodes[four[k].high].velocity.value - nodes[four[k].low].velocity.value;
+      along[k].value = along_[e + static_cast<std::size_t>(k)].value;
+    }
+    const Lanes::Vector pull = products(rate, along).value + since.value * turning->value;
+    for (int k = 0; k < Lanes::kCount; ++k) {
+      const Lanes one(pull[k]);
+      nodes[four[k].low].force.value += one.value * along[k].value;
+      nodes[four[k].high].force.value -= one.value * along[k].value;
+    }
   }
 }
 
 /// In momentum that comes in, so that what all nodes get sums to the constant forces' impulse in every stage.
 template <int Dim>
-void DashpotStages<Dim>::integrate(double h) {
+void DashpotStages<Dim>::integrate(const double* x, const double* v, double h, double* force) {
+  Node* const nodes = nodes_.data();
+  Course* const courses = courses_.data();
+  const std::size_t count = nodes_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    courses[i].start.value = lanes_of<Dim>(v + Dim * i).value;
+    courses[i].constant.value = lanes_of<Dim>(force + Dim * i).value;
+    nodes[i].velocity.value = lanes_of<Dim>(x + Dim * i).value;  // until the edges know where they lie
+  }
   set_edges(h);
-  for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    nodes_[i] = {courses_[i].start, courses_[i].constant};
-    courses_[i].impulse = courses_[i].last_impulse = Lanes(0.0);
+  for (std::size_t i = 0; i < count; ++i) {
+    nodes[i].velocity.value = courses[i].start.value;
+    nodes[i].force.value = courses[i].constant.value;
+    courses[i].impulse.value = courses[i].last_impulse.value = Lanes(0.0).value;
   }
   for (std::size_t j = 0; j < stages_.size(); ++j) {
     add_forces((stages_[j].time - 0.5) * h);
     const Lanes last(stages_[j].last), before(stages_[j].before), rate(h * stages_[j].rate), first_rate(h * stages_[j].first_rate);
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      Node& node = nodes_[i];
-      Course& course = courses_[i];
-      if (j == 0) course.first_force = node.force;
-      const Lanes next = last * course.impulse + before * course.last_impulse + rate * node.force + first_rate * course.first_force;
-      course.last_impulse = course.impulse;
-      course.impulse = next;
-      node = {course.start + Lanes(inverse_mass_[static_cast<Eigen::Index>(i)]) * next, course.constant};
+    for (std::size_t i = 0; i < count; ++i) {
+      Node& node = nodes[i];
+      Course& course = courses[i];
+      if (j == 0) course.first_force.value = node.force.value;
+      const Lanes impulse(course.impulse.value);
+      const Lanes next = last * impulse + before * course.last_impulse + rate * node.force + first_rate * course.first_force;
+      course.last_impulse.value = impulse.value;
+      course.impulse.value = next.value;
+      node.velocity.value = course.start.value + Lanes(inverse_mass_[static_cast<Eigen::Index>(i)]).value * next.value;
+      node.force.value = course.constant.value;
     }
+  }
+  const double rate = 1 / h;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t k = 0; k < Dim; ++k) force[Dim * i + k] = rate * courses[i].impulse[static_cast<int>(k)];
   }
 }
 
 template <int Dim>
-HYDROSTAT_FLATTEN void DashpotStages<Dim>::integrate_here(double h) {
-  integrate(h);
+HYDROSTAT_FLATTEN void DashpotStages<Dim>::integrate_here(const double* x, const double* v, double h, double* force) {
+  integrate(x, v, h, force);
 }
 
 #ifdef HYDROSTAT_WIDE
 template <int Dim>
-HYDROSTAT_WIDE void DashpotStages<Dim>::integrate_wide(double h) {
-  integrate(h);
+HYDROSTAT_WIDE void DashpotStages<Dim>::integrate_wide(const double* x, const double* v, double h, double* force) {
+  integrate(x, v, h, force);
 }
 #endif
 
 template <int Dim>
 void DashpotStages<Dim>::add_mean_forces(const PointsOf<Dim>& x, const PointsOf<Dim>& v, double h, int stages, PointsOf<Dim>& force) {
   set_stages(stages);
-  for (int i = 0; i < body_.node_count(); ++i) {
-    const auto n = static_cast<std::size_t>(i);
-    courses_[n].start = lanes_of<Dim>(v, i);
-    courses_[n].constant = lanes_of<Dim>(force, i);
-    nodes_[n].velocity = lanes_of<Dim>(x, i);  // until the edges know where they lie
-  }
 #ifdef HYDROSTAT_WIDE
   static const bool is_wide = processor_is_wide();
-  is_wide ? integrate_wide(h) : integrate_here(h);
+  is_wide ? integrate_wide(x.data(), v.data(), h, force.data()) : integrate_here(x.data(), v.data(), h, force.data());
 #else
-  integrate_here(h);
+  integrate_here(x.data(), v.data(), h, force.data());
 #endif
-  const double rate = 1 / h;
-  for (int i = 0; i < body_.node_count(); ++i) {
-    const Lanes& impulse = courses_[static_cast<std::size_t>(i)].impulse;
-    for (int k = 0; k < Dim; ++k) force(k, i) = rate * impulse[k];
-  }
 }
 
 template class DashpotStages<2>;

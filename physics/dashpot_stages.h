@@ -53,9 +53,9 @@ class DashpotStages {
   };
   void set_stages(int stages);
   double most_at_a_node(const PointsOf<Dim>& x);
-  void integrate(double h);
-  void integrate_here(double h);
-  void integrate_wide(double h);
+  void integrate(const double* x, const double* v, double h, double* force);
+  void integrate_here(const double* x, const double* v, double h, double* force);
+  void integrate_wide(const double* x, const double* v, double h, double* force);
   void set_edges(double h);
   void add_forces(double time);
 
@@ -66,7 +66,7 @@ class DashpotStages {
   std::vector<Ends> edges_;      // those with damping, and up to three of no length
   std::vector<double> damping_;  // [N s/m]
   std::vector<Lanes> along_;     // each edge at its place, times the root of its damping [(N s/m)^(1/2)]
-  std::vector<double> turning_;  // by how much its rate grows a second because it turns, times that root
+  std::vector<Lanes> turning_;   // of four edges: by how much their rates grow a second because they turn, times that root
   std::vector<Stage> stages_;
   std::vector<Eigen::Matrix<double, Dim, Dim>> blocks_;  // [N s/m] of each node
   double most_at_rest_ = 0;                              // [1/s]

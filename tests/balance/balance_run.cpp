@@ -64,7 +64,7 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
                                              {"delay", &replay.observation.delay_s}};
   std::istringstream parts(variant);
   for (std::string part; std::getline(parts, part, ':');) {
-    if (part == "usual") continue;
+    if (part == "usual" || part == "polished") continue;  // the latter is another creature
     const std::size_t equals = part.find('=');
     if (part.substr(0, equals) == "modes" && equals != std::string::npos) {
       options.regulator.modes = std::stoi(part.substr(equals + 1));

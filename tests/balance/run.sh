@@ -3,8 +3,9 @@
 #   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-w SCENE] [-j JOBS] [-r]
 # Writes DIR/balance.csv and DIR/balance.html (default DIR: out/balance). A run that is there is not run again; one that was
 # broken off goes on where it was. -p SPEED adds, for the plan's body, pushes of so many m/s in 8 directions at 4 phases. -w SCENE lets all go in a
-# creature's scene (README, "A creature's scene"). -r writes README's table. Fails where a run
-# has a hidden hand: an assist, or momentum that gravity, contact and effects do not explain.
+# creature's scene (README, "A creature's scene"). A variant that begins with "polished" goes by polished signals (README, "Polish");
+# "polished:delay=0.02" likewise. -r writes README's table. Fails where a run has a hidden hand: an assist, or momentum that gravity,
+# contact and effects do not explain.
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")")
 assets=${HYDROSTAT_ASSETS:-$project/../shared/assets}
@@ -49,6 +50,30 @@ if [ "$(cat "$out/scene" 2> /dev/null)" != "$world" ]; then
   echo "$world" > "$out/scene"
 fi
 
+# The creature that goes in a clip's variant.
+creature_of() {
+  if [[ $2 == polished* ]]; then echo "$1.polished"; else echo "$1"; fi
+}
+export -f creature_of
+# Makes creatures/$1 by all that follows, unless this program did.
+make_creature() {
+  # A creature of another program would be another creature.
+  [ "$(cat "$out/creatures/$1.made_by" 2> /dev/null)" != "$program" ] || return 0
+  echo "converting $1"
+  local outcome=0
+  build/release/hydrostat convert -o "$out/creatures/$1" --quiet "${@:2}" > /dev/null || outcome=$?
+  if [ "$outcome" != 0 ] && [ "$outcome" != 3 ]; then
+    echo "$1: cannot be converted" >&2
+    exit 1
+  fi
+  if [[ $1 == *.polished ]]; then
+    rm -f -- "$out/rows/${1%.polished},polished"* "$out/frames/${1%.polished},polished"*
+  else
+    find "$out/rows" "$out/frames" -name "$1,*" ! -name "$1,polished*" -delete
+  fi
+  echo "$program" > "$out/creatures/$1.made_by"
+}
+
 names=()
 while IFS='|' read -r name file options; do
   if [ -n "$clips" ] && [[ " $clips " != *" $name "* ]]; then continue; fi
@@ -57,18 +82,13 @@ while IFS='|' read -r name file options; do
     continue
   fi
   names+=("$name")
-  # A creature of another program would be another creature.
-  if [ "$(cat "$out/creatures/$name.made_by" 2> /dev/null)" != "$program" ]; then
-    echo "converting $name"
-    outcome=0
-    eval "build/release/hydrostat convert '$file' -o '$out/creatures/$name' --quiet $options" > /dev/null || outcome=$?
-    if [ "$outcome" != 0 ] && [ "$outcome" != 3 ]; then
-      echo "$name: cannot be converted" >&2
-      exit 1
-    fi
-    rm -f -- "$out/rows/$name,"* "$out/frames/$name,"*
-    echo "$program" > "$out/creatures/$name.made_by"
-  fi
+  eval "options=($options)"
+  for variant in $variants; do
+    creature=$(creature_of "$name" "$variant")
+    polish=()
+    [ "$creature" = "$name" ] || polish=(--polish on)
+    make_creature "$creature" "$file" "${options[@]}" "${polish[@]}"
+  done
 done <<< "$table"
 
 # One line a run: its name, which is its key in the table.
@@ -93,7 +113,7 @@ run_case() {  # out name,variant,seed,push,cycles
   IFS=, read -r name variant seed push cycles <<< "$2"
   frames=(-)
   [ "$seed" != 1 ] || frames=("$1/frames/$name,$variant.json")
-  build/release/tests/balance_run "$1/creatures/$name" "$variant" "$seed" "$push" "$cycles" "${frames[@]}" ${scene:+"$scene"} > "$row.part" || return 1
+  build/release/tests/balance_run "$1/creatures/$(creature_of "$name" "$variant")" "$variant" "$seed" "$push" "$cycles" "${frames[@]}" ${scene:+"$scene"} > "$row.part" || return 1
   mv -- "$row.part" "$row"
 }
 export -f run_case

@@ -7,6 +7,7 @@
 
 #include "retarget/contact_cones.h"
 #include "retarget/contact_loads.h"
+#include "retarget/dense_product.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -209,7 +210,7 @@ double Corrector::regulate(const CostToGo& cost, double time_s, const Eigen::Mat
   const Eigen::Index modes = cost.modes().count();
   const double step = options_.horizon_s * speed_unit_ / length_, next_s = time_s + options_.horizon_s;
   const Eigen::MatrixXd project = turned(cost.modes().project, heading);
-  const Eigen::MatrixXd speeds = project * responses_.velocities() / speed_unit_;  // by each muscle; places go with them
+  const Eigen::MatrixXd speeds = product(project, responses_.velocities()) / speed_unit_;  // by each muscle; places go with them
   Eigen::VectorXd free(2 * modes);                                                 // z by no muscle
   free.tail(modes) = project * deviation_ / speed_unit_;
   free.head(modes) = step * free.tail(modes) + project * (state.x - reference.x).reshaped() / length_;
@@ -218,8 +219,7 @@ double Corrector::regulate(const CostToGo& cost, double time_s, const Eigen::Mat
   const auto [of_speeds, with_step] = by_step(cost.at(next_s).cast<double>(), step);
   const Eigen::VectorXd lasting = options_.regulator.last * (cost.at_disturbed(next_s).cast<double>() * disturbance_);
   const Eigen::VectorXd pull = with_step.transpose() * free + step * lasting.head(modes) + lasting.tail(modes);
-  Eigen::MatrixXd left(speeds.cols(), speeds.cols());
-  left.triangularView<Eigen::Lower>() = speeds.transpose() * (of_speeds * speeds).eval();
+  Eigen::MatrixXd left = product_of_transposed(speeds, product(of_speeds, speeds));
   left.diagonal().array() += options_.regulator.effort;
   const double rms = act(left, -speeds.transpose() * pull, activation);
   predicted_ = free;

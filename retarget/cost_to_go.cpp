@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "retarget/dense_product.h"
 #include "retarget/linear_step.h"
 
 namespace hydrostat::retarget {
@@ -77,24 +78,24 @@ void go_back(const LinearStep& step, const Eigen::VectorXd& weights, const Regul
   Eigen::MatrixXd& cost = costs.of_deviation;
   const Eigen::Index modes = step.drive.rows();
   const CostByStep next = by_step(cost, step.advance);
-  Eigen::MatrixXd carried = step.carry.transpose() * next.of_speeds;  // 2R x R: F^T S P
+  Eigen::MatrixXd carried = product_of_transposed(step.carry, next.of_speeds);  // 2R x R: F^T S P
   carried.topRows(modes) += next.with_step.topRows(modes);
-  Eigen::MatrixXd left = step.drive.transpose() * next.of_speeds * step.drive;
+  Eigen::MatrixXd left = product(product_of_transposed(step.drive, next.of_speeds), step.drive);
   left.diagonal().array() += options.effort;
-  const Eigen::MatrixXd coupled = carried * step.drive, gains = left.ldlt().solve(coupled.transpose());
+  const Eigen::MatrixXd coupled = product(carried, step.drive), gains = left.ldlt().solve(coupled.transpose());
 
   const Eigen::MatrixXd ahead = cost + options.last * costs.of_disturbance;
   const Eigen::MatrixXd ahead_by_step = step.advance * ahead.topRows(modes) + ahead.bottomRows(modes);  // R x 2R: P^T ahead
-  costs.of_disturbance.noalias() = (step.carry.transpose() - gains.transpose() * step.drive.transpose()) * ahead_by_step;
+  costs.of_disturbance = product_of_transposed(step.carry - product(step.drive, gains), ahead_by_step);
   costs.of_disturbance.topRows(modes) += ahead.topRows(modes);
 
-  const Eigen::MatrixXd by_place = next.with_step.topRows(modes) * step.carry;  // R x 2R
+  const Eigen::MatrixXd by_place = product(next.with_step.topRows(modes), step.carry);  // R x 2R
   const Eigen::MatrixXd of_places = cost.topLeftCorner(modes, modes);
-  cost.noalias() = step.carry.transpose() * (next.of_speeds * step.carry);
+  cost = product_of_transposed(step.carry, product(next.of_speeds, step.carry));
   cost.topRows(modes) += by_place;
   cost.leftCols(modes) += by_place.transpose();
   cost.topLeftCorner(modes, modes) += of_places;
-  cost.noalias() -= coupled * gains;
+  cost -= product(coupled, gains);
   cost = (0.5 * (cost + cost.transpose())).eval();
   cost.diagonal() += weights;
 }

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "retarget/contact_loads.h"
+#include "retarget/dense_product.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -54,7 +55,7 @@ LinearSteps::Derivatives LinearSteps::derivatives(const PlannedMoment& moment) {
   dashpots_.set_zero();
   dashpots_.add_damping(scene_.body, moment.state.x, 1);
   const Eigen::MatrixXd by_speed = dashpots_.lower().selfadjointView<Eigen::Lower>() * modes_.fields;
-  return {symmetric(modes_.fields.transpose() * by_place), symmetric(modes_.fields.transpose() * by_speed)};
+  return {symmetric(product_of_transposed(modes_.fields, by_place)), symmetric(product_of_transposed(modes_.fields, by_speed))};
 }
 
 LinearSteps::Holds LinearSteps::holds(const PlannedMoment& moment) const {
@@ -93,15 +94,15 @@ LinearStep LinearSteps::at(const PlannedMoment& moment) {
   const Holds held = holds(moment);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> system(Eigen::MatrixXd::Identity(modes, modes) + h * damping + h * h * stiffness +
                                                               contact_mass_ * held.stick);
-  const Eigen::MatrixXd inverse =
-      system.eigenvectors() * system.eigenvalues().cwiseMax(kSoftest).cwiseInverse().asDiagonal() * system.eigenvectors().transpose();
+  const Eigen::MatrixXd inverse = product(system.eigenvectors() * system.eigenvalues().cwiseMax(kSoftest).cwiseInverse().asDiagonal(),
+                                          system.eigenvectors().transpose());
   LinearStep step;
   step.advance = h * per_second;
   step.carry.resize(modes, 2 * modes);
   step.carry.rightCols(modes) = inverse;
-  step.carry.leftCols(modes).noalias() = inverse * (h * stiffness + (kLevelShare * contact_mass_ / h) * held.level) / -per_second;
-  const Eigen::MatrixXd push = modes_.fields.transpose() * (forces_.force_per_activation(moment.state.x) * muscles_.fields);
-  step.drive.noalias() = inverse * ((h / speed_unit_) * push);
+  step.carry.leftCols(modes) = product(inverse, h * stiffness + (kLevelShare * contact_mass_ / h) * held.level) / -per_second;
+  const Eigen::MatrixXd push = product_of_transposed(modes_.fields, forces_.force_per_activation(moment.state.x) * muscles_.fields);
+  step.drive = product(inverse, (h / speed_unit_) * push);
   return step;
 }
 

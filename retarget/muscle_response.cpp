@@ -74,9 +74,7 @@ bool MuscleResponse::make(const physics::State& state, physics::InternalForces<3
   add_springs(state);
   add_elements(state, forces);
   matrix_.solve_in_place(made_);
-  scaled_ = node_shares_.cwiseSqrt().asDiagonal() * made_;
-  made_normal_.setZero(made_.cols(), made_.cols());
-  made_normal_.selfadjointView<Eigen::Lower>().rankUpdate(scaled_.transpose());
+  is_normal_made_ = false;
   return true;
 }
 
@@ -145,9 +143,9 @@ void MuscleResponse::find_changes(const std::vector<ContactState>& touching) {
 }
 
 void MuscleResponse::apply_changes() {
+  is_normal_current_ = false;
   if (changes_.empty()) {
     velocities_ = made_;
-    node_normal_ = made_normal_;
     return;
   }
   const physics::ContactPoints& points = scene_.contact_points;
@@ -164,12 +162,28 @@ void MuscleResponse::apply_changes() {
   for (Eigen::Index k = 0; k < count; ++k) capacitance(k, k) += changes_[static_cast<std::size_t>(k)].sign / stiffness;
   capacitance_.compute(capacitance);
 
-  const Eigen::MatrixXd taken = capacitance_.solve(along_changes(made_));  // changes x muscles
-  velocities_.noalias() = made_ - held_ * taken;
-  const Eigen::MatrixXd weighted = node_shares_.asDiagonal() * held_;
-  const Eigen::MatrixXd half = taken.transpose() * (weighted.transpose() * made_ - 0.5 * (weighted.transpose() * held_) * taken);
+  taken_ = capacitance_.solve(along_changes(made_));
+  velocities_.noalias() = made_ - held_ * taken_;
+}
+
+void MuscleResponse::find_made_normal() {
+  if (is_normal_made_) return;
+  scaled_ = node_shares_.cwiseSqrt().asDiagonal() * made_;
+  made_normal_.setZero(made_.cols(), made_.cols());
+  made_normal_.selfadjointView<Eigen::Lower>().rankUpdate(scaled_.transpose());
+  is_normal_made_ = true;
+}
+
+const Eigen::MatrixXd& MuscleResponse::node_normal() {
+  if (is_normal_current_) return node_normal_;
+  find_made_normal();
   node_normal_ = made_normal_;
+  is_normal_current_ = true;
+  if (changes_.empty()) return node_normal_;
+  const Eigen::MatrixXd weighted = node_shares_.asDiagonal() * held_;
+  const Eigen::MatrixXd half = taken_.transpose() * (weighted.transpose() * made_ - 0.5 * (weighted.transpose() * held_) * taken_);
   node_normal_.triangularView<Eigen::Lower>() -= half + half.transpose();
+  return node_normal_;
 }
 
 Eigen::MatrixXd MuscleResponse::along_changes(const Eigen::MatrixXd& x) const {

@@ -35,7 +35,7 @@ class MuscleResponse {
   /// 3N x muscles [m/s per unit of a muscle].
   const Eigen::MatrixXd& velocities() const { return velocities_; }
   /// R^T W R of these velocities, muscles x muscles; only the lower triangle counts.
-  const Eigen::MatrixXd& node_normal() const { return node_normal_; }
+  const Eigen::MatrixXd& node_normal();
   /// x <- A^-1 x, of 3N.
   void solve_in_place(Eigen::VectorXd& x) const;
 
@@ -58,6 +58,7 @@ class MuscleResponse {
   void add_elements(const physics::State& state, const physics::InternalForces<3>& forces);
   void find_changes(const std::vector<ContactState>& touching);
   void apply_changes();
+  void find_made_normal();
   /// J x, of so many columns.
   Eigen::MatrixXd along_changes(const Eigen::MatrixXd& x) const;
 
@@ -72,11 +73,13 @@ class MuscleResponse {
   int age_ = 0;                           // calls since it was made
   std::vector<ContactState> touching_;    // when it was made
   std::vector<ContactState> touching_now_;
-  Eigen::MatrixXd made_, made_normal_;    // velocities and their products then
+  Eigen::MatrixXd made_, made_normal_;    // velocities and, where they were asked for, their products then
   std::vector<Change> changes_;           // since then
   Eigen::MatrixXd held_;                  // Z, 3N x changes
+  Eigen::MatrixXd taken_;                 // (C^-1 + J Z)^-1 J made_, changes x muscles
   Eigen::PartialPivLU<Eigen::MatrixXd> capacitance_;  // C^-1 + J Z
   Eigen::MatrixXd velocities_, node_normal_, scaled_;
+  bool is_normal_made_ = false, is_normal_current_ = false;  // whether made_normal_ and node_normal_ belong to what is there now
   Eigen::Matrix3Xd pull_;                 // 3 x E [N s]: of a spring's unit activation over the horizon
 };
 

@@ -283,9 +283,10 @@ void Conversion::follow(const retarget::NominalPath& path) {
 void Conversion::polish() {
   retarget::PerformOptions plan = perform_options();
   plan.seed = 0;
-  key_ = key_after(key_, "polish");
+  key_ = key_after(key_, "polish with trials");
   const retarget::Polished polished =
       stages_.run("polish", key_, [&] { return retarget::polish(target_.performer, signals_, plan); });  // outside a scene
+  add_warnings(retarget::polish_warnings(polished));
   if (!polished.is_better()) return;
   const retarget::SignalSet solved = signals_;
   const retarget::Performances before = performances_;

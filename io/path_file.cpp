@@ -36,8 +36,16 @@ struct ToldPath {
 };
 void name_told_path(RecordArchive& archive, ToldPath& told) { name_path(archive, told.path, told.report); }
 
+void name_trials(RecordArchive& archive, const std::string& name, retarget::TrialsOutcome& trials) {
+  archive.exchange(name + "/lost", trials.lost);
+  archive.exchange(name + "/shape", trials.shape_rms_length);
+}
+
 void name_fields(RecordArchive& archive, retarget::Polished& polished) {
   name_path(archive, polished.path, polished.report);
+  name_trials(archive, "solved_on_trials", polished.solved_on_trials);
+  name_trials(archive, "polished_on_trials", polished.polished_on_trials);
+  archive.exchange("is_frail", polished.is_frail);
   name_spectrum(archive, "activation", polished.signals.activation);
   name_spectrum(archive, "force", polished.signals.force);
 }

@@ -73,8 +73,8 @@ bool is_as_planned(const Performer& performer, const ReplayOptions& options) {
   return is_level && !performer.world.is_told() && performer.scene.obstacles.empty() && options.pushes.empty();
 }
 
-/// Whether one of kTrials stays up, by the options' feedback.
-bool stands(const Trial& trial, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+/// One of kTrials, by the options' feedback.
+Replay run_trial(const Trial& trial, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
   ReplayOptions shoved = options.replay;
   shoved.correct = true;
   shoved.trace = false;
@@ -82,8 +82,7 @@ bool stands(const Trial& trial, const Performer& performer, const SignalSet& sig
   shoved.corrector = with(options.feedback, options.replay.corrector);
   Push& shove = shoved.pushes.emplace_back();
   shove.delta_v = kTrialShove * Eigen::Vector3d(std::cos(trial.angle), 0, std::sin(trial.angle));
-  const Replay replay = run(performer, varied_scene(performer.scene, trial.body), signals_of(signals), signals.limit, shoved, &performer.path);
-  return !replay.report.fell && replay.termination == physics::Termination::kDone;
+  return run(performer, varied_scene(performer.scene, trial.body), signals_of(signals), signals.limit, shoved, &performer.path);
 }
 
 Lapse lapse_of(double straying) {
@@ -156,13 +155,20 @@ Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const R
   return lapse_of(straying(performer, options, run));
 }
 
-int count_trials_lost(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  const auto falls = [&](const Trial& trial) { return !stands(trial, performer, signals, options); };
-  const auto half = kTrials.begin() + kTrials.size() / 2;
-  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred,
-                           [&] { return std::count_if(kTrials.begin(), half, falls); });
-  const auto here = std::count_if(half, kTrials.end(), falls);
-  return static_cast<int>(here + beside.get());
+TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  std::array<Replay, kTrials.size()> runs;
+  const auto go = [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) runs[k] = run_trial(kTrials[k], performer, signals, options);
+  };
+  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, 0, runs.size() / 2);
+  go(runs.size() / 2, runs.size());
+  beside.get();
+  TrialsOutcome result;
+  for (const Replay& run : runs) {
+    if (run.report.fell || run.termination != physics::Termination::kDone) ++result.lost;
+    result.shape_rms_length += run.report.shape_rms_length / static_cast<double>(runs.size());
+  }
+  return result;
 }
 
 Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
@@ -180,7 +186,7 @@ Performances perform_steadily(const Performer& performer, const SignalSet& signa
     Performances next = perform(performer, signals, other);
     const double its = straying(performer, options.replay, next.main());
     if (its > 1 && (is_well || its >= kBetter * least)) continue;
-    const int lost = its <= 1 && options.is_thorough ? count_trials_lost(performer, signals, other) : 0;
+    const int lost = its <= 1 && options.is_thorough ? go_on_trials(performer, signals, other).lost : 0;
     if (is_well && lost >= result.trials_lost) continue;
     least = its;
     result.trials_lost = lost;

@@ -100,8 +100,13 @@ constexpr double kBetter = 0.5;  // share of the straying that anything but the 
 /// cycle at least; of a loop that turns its drift alone counts.
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
 
-/// How many of kTrials fall or diverge by the options' feedback, in so long a run as theirs.
-int count_trials_lost(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
+/// What became of kTrials.
+struct TrialsOutcome {
+  int lost = 0;                 // that fell or diverged
+  double shape_rms_length = 0;  // as in ReplayReport, the mean of all, as long as they went
+};
+/// Lets kTrials go by the options' feedback, as long as the options have it.
+TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, where the options
 /// are thorough a regulator, such as looks less far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times

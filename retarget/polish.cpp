@@ -140,7 +140,9 @@ double lasting(const SignalSet& signals, double most_s, double cycles) {
 }  // namespace
 
 Polished polish(const Performer& performer, const SignalSet& signals, const PerformOptions& options, const PolishOptions& polish) {
-  Polished result{signals, performer.path, {}};
+  Polished result;
+  result.signals = signals;
+  result.path = performer.path;
   PerformOptions replays = options;
   replays.replay.duration_s = lasting(signals, options.replay.duration_s, polish.first_cycles);
   Round best{signals, performer, {}, {}};
@@ -171,6 +173,15 @@ Polished polish(const Performer& performer, const SignalSet& signals, const Perf
     }
   }
   if (report.rounds == 0 || best.report.correction_rms >= report.correction_rms_before) return result;
+  PerformOptions trials = options;
+  trials.replay.trace = false;
+  SignalSet without_layers = signals;
+  without_layers.layers.clear();
+  result.solved_on_trials = go_on_trials(performer, without_layers, trials);
+  result.polished_on_trials = go_on_trials(best.performer, best.signals, trials);
+  const double most_on_trials = polish.most_on_trials * result.solved_on_trials.shape_rms_length + polish.most_shape;
+  result.is_frail = result.polished_on_trials.lost > result.solved_on_trials.lost || !(result.polished_on_trials.shape_rms_length <= most_on_trials);
+  if (result.is_frail) return result;
   report.correction_rms_after = best.report.correction_rms;
   SignalSet learned = std::move(best.signals);
   carry_forces(performer, signals, performer.path, learned, best.performer.path);

@@ -13,6 +13,7 @@ struct PolishOptions {
   double least_fall = 0.1;       // share by which a round must bring the correction down to be followed by another
   double enough = 1e-3;          // share of the correction at the start that is as good as none
   double most_shape = 1e-3;      // per L, by which the shape may go further from the target
+  double most_on_trials = 1.25;  // factor by which, beside that, it may go further on bodies off the plan (kTrials)
 };
 
 /// What iterative learning made of a creature's signals.
@@ -20,6 +21,8 @@ struct Polished {
   SignalSet signals;
   NominalPath path;
   PolishReport report;  // the open loop is not looked at
+  TrialsOutcome solved_on_trials, polished_on_trials;  // of what helps the planned body
+  bool is_frail = false;  // whether that costs others their balance, and was left out
   bool is_better() const { return report.correction_rms_after < report.correction_rms_before; }
 };
 
@@ -35,7 +38,9 @@ struct Polished {
 /// is learned with the input is ours.
 ///
 /// What falls, or strays from the target's shape by more than `most_shape`, is left out; the best round is kept. Where none is
-/// better, or the creature falls from the start, signals and path stay as they were. `options` as perform's, for the closed loop.
+/// better, or the creature falls from the start, signals and path stay as they were; and where of kTrials more fall by it than without, or
+/// stray further: what clears a foot by the corrector's help alone may catch it on a path where nothing helps it. `options` as perform's, for
+/// the closed loop.
 Polished polish(const Performer& performer, const SignalSet& signals, const PerformOptions& options, const PolishOptions& polish = {});
 
 }  // namespace hydrostat::retarget

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "retarget/performance.h"
+#include "retarget/polish.h"
 
 namespace hydrostat::retarget {
 
@@ -18,5 +19,8 @@ std::vector<std::string> inverse_warnings(const InverseReport& inverse);
 /// Which feedback took the place of what was wished (perform_steadily) and why, or that a creature loses its way on any; none where what
 /// was wished will do, nor of a fall, which is told elsewhere.
 std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished = {});
+
+/// Of polished signals that were left out, for they cost bodies off the plan their balance.
+std::vector<std::string> polish_warnings(const Polished& polished);
 
 }  // namespace hydrostat::retarget

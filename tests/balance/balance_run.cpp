@@ -38,9 +38,16 @@ struct Slope {
   }
 };
 
-/// A variant of the feedback: "usual", as convert has it, or that with changes: "effort=1:settle=0.15"; "regulator=0.001:cost=1e-4"; of the
-/// ground: "slope=5:side=90"; or of the control mesh: "lod=52", as replay has it, with other feedback where it falls or loses its way. The creature's own feedback is factors
-/// on all that.
+/// What the usual feedback is weighed against: deviations of nodes alone; the whole body alone, by its momentum, cones and feet; both
+/// without placing feet where the body is to be caught; and a cost to go.
+const std::map<std::string, std::string> kNamed{{"deviations", "root=0:cone=0:foot=0:step=0:long_step=1e9"},
+                                                {"whole_body", "nodes=0"},
+                                                {"unplaced", "step=0:long_step=1e9"},
+                                                {"regulator", "regulator=0.01"}};
+
+/// A variant of the feedback: "usual", as convert has it, or that with changes: one of kNamed; "effort=1:settle=0.15";
+/// "regulator=0.001:cost=1e-4"; of the ground: "slope=5:side=90"; or of the control mesh: "lod=52", as replay has it, with other feedback
+/// where it falls or loses its way. The creature's own feedback is factors on all that.
 void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Slope& slope, double& nodes) {
   retarget::CorrectorOptions& options = replay.corrector;
   const std::map<std::string, double*> knobs{{"effort", &options.effort},       {"settle", &options.settle_s},
@@ -65,6 +72,10 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
   std::istringstream parts(variant);
   for (std::string part; std::getline(parts, part, ':');) {
     if (part == "usual" || part == "polished") continue;  // the latter is another creature
+    if (const auto named = kNamed.find(part); named != kNamed.end()) {
+      set_variant(named->second, replay, slope, nodes);
+      continue;
+    }
     const std::size_t equals = part.find('=');
     if (part.substr(0, equals) == "modes" && equals != std::string::npos) {
       options.regulator.modes = std::stoi(part.substr(equals + 1));

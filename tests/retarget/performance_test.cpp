@@ -106,7 +106,7 @@ TEST(PerformSteadily, TakesWhatKeepsUpThePlannedBodyAndMostOfThoseOffThePlan) {
   const auto trials_lost_by = [&](const Feedback& feedback) {
     PerformOptions by = options;
     by.feedback = feedback;
-    return count_trials_lost(performer, signals, by);
+    return go_on_trials(performer, signals, by).lost;
   };
   ASSERT_TRUE(falls_by({}));
   const Performances steady = perform_steadily(performer, signals, options);
@@ -147,15 +147,15 @@ TEST(CountTrialsLost, IsNoneOfWhatStandsAndAllOfWhatFalls) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);
   PerformOptions options = lasting(1);
-  EXPECT_EQ(count_trials_lost(performer, signals, options), 0);
+  EXPECT_EQ(go_on_trials(performer, signals, options).lost, 0);
   options.threads = 1;
   options.feedback = {1, 0.5, 10.0 / 3};
   options.replay.observation.delay_s = 0.09;
   options.replay.duration_s = 1.5;
-  const int lost = count_trials_lost(performer, signals, options);
+  const int lost = go_on_trials(performer, signals, options).lost;
   EXPECT_EQ(lost, static_cast<int>(kTrials.size()));
   options.threads = 2;
-  EXPECT_EQ(count_trials_lost(performer, signals, options), lost);
+  EXPECT_EQ(go_on_trials(performer, signals, options).lost, lost);
 }
 
 /// The box as it glides over ground that hardly holds it, so far that gains differ in how far.

@@ -91,6 +91,26 @@ TEST(Polish, LearnsUnderTheLayersAndLeavesThem) {
   EXPECT_NEAR(told, change, 0.02 * std::abs(change) + 1e-3);
 }
 
+/// What helps the planned body is left out where bodies off the plan stray by it, or fall.
+TEST(Polish, IsNotBoughtWithTheBalanceOfOtherBodies) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = wrong_signals(performer);
+  const PerformOptions options = lasting(1.2);
+  const Polished kept = polish(performer, signals, options, quick());
+  ASSERT_TRUE(kept.is_better());
+  EXPECT_FALSE(kept.is_frail);
+  EXPECT_LE(kept.polished_on_trials.lost, kept.solved_on_trials.lost);
+  EXPECT_GT(kept.solved_on_trials.shape_rms_length, 0);
+  PolishOptions strict = quick();  // to whom any straying is too much
+  strict.most_on_trials = -strict.most_shape / kept.solved_on_trials.shape_rms_length;
+  const Polished left = polish(performer, signals, options, strict);
+  EXPECT_TRUE(left.is_frail);
+  EXPECT_FALSE(left.is_better());
+  EXPECT_TRUE(left.path.is_empty());
+  EXPECT_EQ(largest_change(left.signals, signals), 0);
+  EXPECT_EQ(left.polished_on_trials.shape_rms_length, kept.polished_on_trials.shape_rms_length);
+}
+
 TEST(Polish, LeavesWhatFallsAsItWas) {
   const Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);

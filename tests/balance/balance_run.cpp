@@ -40,7 +40,7 @@ struct Slope {
 
 /// What the usual feedback is weighed against: deviations of nodes alone; the whole body alone, by its momentum, cones and feet; both
 /// without placing feet where the body is to be caught; and a cost to go.
-const std::map<std::string, std::string> kNamed{{"deviations", "root=0:cone=0:foot=0:step=0:long_step=1e9"},
+const std::map<std::string, std::string> kNamed{{"deviations", "root=1e-6:cone=0:foot=0:step=0:long_step=1e9"},
                                                 {"whole_body", "nodes=0"},
                                                 {"unplaced", "step=0:long_step=1e9"},
                                                 {"regulator", "regulator=0.01"}};

@@ -8,8 +8,7 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kMostGain = 0.15;     // change of the swing: with a tenth, fine worms lag by 1 to 2 % of every stride
-constexpr double kMost = 0.1;          // activation by which a body steers
+constexpr double kMost = 0.1;          // change of the swing; activation by which a body steers
 constexpr double kLeastStride = 0.02;  // of L
 constexpr double kLeastStretch = 0.5;  // of a stride: what stretches less does not travel by it
 constexpr int kSamples = 64;           // of a period
@@ -68,7 +67,7 @@ void StrideFeedback::follow(const RigidFit& fit, double seconds) {
   const Eigen::Vector3d off = level(fit.mean_b - fit.mean_a);
   const double smoothing = 1 - std::exp(-2 * seconds / period_s_);
   const double spare = steers() ? 1 - std::abs(steering_) / most_steering_ : 1;
-  const double most = kMostGain * std::min(spare / kSpareBend, 1.0);
+  const double most = kMost * std::min(spare / kSpareBend, 1.0);
   gain_ += (std::clamp(-off.dot(way) / stride.norm(), -most, most) - gain_) * smoothing;
   // Turns about y: what lies to the left is met by a turn to the right.
   const double left = off.dot(Eigen::Vector3d::UnitY().cross(way));

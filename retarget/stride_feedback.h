@@ -9,7 +9,7 @@
 namespace hydrostat::retarget {
 
 /// Return-map feedback for a creature that drags itself: what a cycle loses by slipping, the next ones win by longer strides.
-/// The signals' swing about their means grows by the share of a stride by which the body lags, at most 0.15, smoothed
+/// The signals' swing about their means grows by the share of a stride by which the body lags, at most a tenth, smoothed
 /// over half a cycle. Where its strides come from stretching and shortening it steers too: it bends to one side while it
 /// stretches and to the other while it shortens, so that both ends, each in its turn on the way, turn to the heading that
 /// brings the body back to its path within some strides; what is bent as far as it may be strides as planned, for longer

@@ -38,9 +38,8 @@ struct Polished {
 /// is learned with the input is ours.
 ///
 /// What falls, or strays from the target's shape by more than `most_shape`, is left out; the best round is kept. Where none is
-/// better, or the creature falls from the start, signals and path stay as they were; and where of kTrials more fall by it than without, or
-/// stray further: what clears a foot by the corrector's help alone may catch it on a path where nothing helps it. `options` as perform's, for
-/// the closed loop.
+/// better, or the creature falls from the start, signals and path stay as they were; so they do where of kTrials more fall by it than without,
+/// or stray further. `options` as perform's, for the closed loop.
 Polished polish(const Performer& performer, const SignalSet& signals, const PerformOptions& options, const PolishOptions& polish = {});
 
 }  // namespace hydrostat::retarget

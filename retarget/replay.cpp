@@ -22,6 +22,7 @@
 #include "retarget/return_map.h"
 #include "retarget/roll_brace.h"
 #include "retarget/slip_meter.h"
+#include "retarget/slope_lean.h"
 #include "retarget/state_estimate.h"
 #include "retarget/strength_estimate.h"
 #include "retarget/stride_feedback.h"
@@ -89,6 +90,7 @@ class Run {
   WayError go_for_a_cycle(const ReturnMap::Handles& handles);
   const physics::State& estimate();
   void look_at_way(const physics::State& seen, double time_s);
+  double way_now(double time_s) const;
   Eigen::Matrix3d heading_now() const;
   void correct(const physics::State& seen);
   void control();
@@ -127,6 +129,7 @@ class Run {
   StrideFeedback stride_;
   ReturnMap return_map_;
   LeapFeedback leap_;
+  SlopeLean lean_;
   std::optional<RollBrace> brace_;  // where the body is seen as it is: it goes by how fast that rolls
   long cycles_ = 0;  // of a loop, whose ends were seen
 
@@ -178,6 +181,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),
       leap_(input.prepared, input.length),
+      lean_(input.prepared, input.model),
       correction_(Eigen::VectorXd::Zero(input.muscles.fields.cols())),
       state_(first_state(target_, curve_, path_)),
       activation_(input.scene.body.edge_count()),
@@ -196,6 +200,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
   if (!plant_.obstacles.empty()) uneven_.emplace(plant_, input.prepared, input.length, options.corrector.clearance);
   curve_.at(0, reference_.x, reference_.v);
   fit_ = best_rigid_fit(reference_.x, state_.x, mass_shares_);
+  if (options.correct && lean_.is_needed()) lean_.apply(lean_.at(0), input.scene.body.edges, state_);  // it is let go as it is to stand
   const bool is_seen = options.correct && options.observation.is_exact();
   if (is_seen && target_.loop && has_flight(input.prepared)) strength_.emplace(input.model, control_s_);
   if (is_seen) brace_.emplace(input.prepared, input.model);
@@ -269,11 +274,18 @@ const physics::State& Run::estimate() {
   return estimate_.next(seen, path_then_, reference_);
 }
 
-/// How far what is seen of the body is from where it would be by the signals alone.
+/// How far what is seen of the body is from where it would be by the signals alone, on a slope by them and as it leans.
 void Run::look_at_way(const physics::State& seen, double time_s) {
   curve_.at(time_s, reference_.x, reference_.v);
   path_.apply(time_s, reference_);
   fit_ = best_rigid_fit(reference_.x, seen.x, mass_shares_);
+  if (lean_.is_needed()) fit_.mean_b -= (fit_.mean_a.y() - input_.model.ground.offset) * lean_.at(way_now(time_s));
+}
+
+/// [rad] by which the body's path has turned since the target's first frame, as the body heads.
+double Run::way_now(double time_s) const {
+  const double turned = target_.loop ? target_.yaw * time_s / target_.duration_s() : 0;
+  return turned + yaw_of(fit_.rotation);
 }
 
 /// The turn from the target's first period to where the glided reference is.
@@ -330,6 +342,7 @@ void Run::control() {
     uneven_->lead(contact_.in_air, seen, glided_, gain_.foot_settle_s, contact_.lead);
     uneven_->apply(physics::centre_of_mass(input_.scene.body, glided_.x), glided_);
   }
+  if (lean_.is_needed()) lean_.apply(lean_.at(way_now(time_s_)), input_.scene.body.edges, glided_);
   command(time_s_ + 0.5 * control_s_);
   feedback_ = -activation_;
   correct(seen);
@@ -346,6 +359,7 @@ void Run::command(double time_s) {
     path_.apply(time_s, commanded_);
     strength_->apply(commanded_.x, activation_);
   }
+  lean_.apply(activation_);
   stride_.apply(time_s, activation_);
   if (brace_) brace_->apply(activation_);
   return_map_.apply(time_s, activation_);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "io/write_file.h"
 #include "tests/e2e/made_creature.h"
 
 namespace hydrostat::seeds_test {
@@ -38,15 +39,20 @@ TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
   EXPECT_GE(good, kLeastShare * seeds);
   // The last of them climbs, too, a slope of 5 degrees and steps of 3 % of L.
   const auto travel_in = [&](const std::string& world, int cycles) {
-    const std::string file = std::string(HYDROSTAT_SAMPLES) + "/worlds/" + world;
     const Outcome climbed =
-        hydrostat_in(directory.path, "replay creature --quiet --cycles " + std::to_string(cycles) + " -o up.glb --scene " + in_quotes(file));
+        hydrostat_in(directory.path, "replay creature --quiet --cycles " + std::to_string(cycles) + " -o up.glb --scene " + in_quotes(world));
     EXPECT_EQ(climbed.exit_code, 0) << world << climbed.err;
     const std::size_t travel = climbed.out.find("travel ");
     return travel == std::string::npos ? 0 : std::stod(climbed.out.substr(travel + 7));  // L a cycle
   };
-  EXPECT_NEAR(travel_in("slope_for_a_trot.toml", 5), 0.435, 0.02);
-  EXPECT_NEAR(travel_in("steps_for_a_trot.toml", 12), 0.435, 0.05);
+  const std::string worlds = std::string(HYDROSTAT_SAMPLES) + "/worlds/";
+  EXPECT_NEAR(travel_in(worlds + "slope_for_a_trot.toml", 5), 0.435, 0.02);
+  EXPECT_NEAR(travel_in(worlds + "steps_for_a_trot.toml", 12), 0.435, 0.05);
+  // Along the side of a hill it would hang over its lower feet and drift down, if it did not lean.
+  for (const char* heading : {"0.0", "180.0"}) {
+    io::write_file(directory.path / "side.toml", std::string("[ground]\nslope_deg = 8.0\nslope_heading_deg = ") + heading + "\n");
+    EXPECT_NEAR(travel_in("side.toml", 12), 0.435, 0.005);
+  }
 }
 
 TEST(Pushes, TheWormDoesNotRollAwayFromThoseThatComeFromTheSideAndComesToRest) {

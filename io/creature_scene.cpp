@@ -7,6 +7,7 @@
 #include "io/scene_shapes.h"
 #include "io/scene_surroundings.h"
 #include "io/toml_reader.h"
+#include "retarget/displacement.h"
 #include "retarget/performed_scenario.h"
 
 namespace hydrostat::io {
@@ -179,6 +180,7 @@ std::vector<std::string> put_in_scene(const std::filesystem::path& file, retarge
   if (!broken.empty()) throw root.refusal("effects", broken, "Add what it needs, or leave the effect to 'auto'.");
   refuse_swallowing(root, scenario);
   performer.scene = std::move(scenario.scene);
+  if (performer.scene.water || performer.scene.air) retarget::fit_displacement(performer.skin, std::pow(performer.size, 3), performer.scene.body);
   decide_self_contact(wishes["self_contact"], root, friction, performer);
   world.moves = std::move(scenario.moves);
   world.pushes = std::move(scenario.pushes);

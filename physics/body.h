@@ -33,6 +33,8 @@ struct BodyOf {
   Eigen::VectorXd volume_stiffness;                                 // [J] T: kappa times the filled volume; or empty: none
   std::vector<BodyElements<Dim>> elements = {};
   std::vector<int> held = {};  // nodes that stay where they start, each once; what holds them is booked
+  Eigen::VectorXd displaced_share = {};  // T, of a tet's volume that keeps a fluid out [-]; empty: all of it
+  double wetted_share = 1;               // of the surface of the tets that a fluid's resistance sees [-]
 
   int node_count() const { return static_cast<int>(mass.size()); }
   int edge_count() const { return static_cast<int>(rest_length.size()); }

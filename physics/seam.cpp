@@ -260,7 +260,7 @@ Eigen::VectorXi whole_edges(const BodyOf<Dim>& whole, const BodyOf<Dim>& split, 
   return edges;
 }
 
-int count_parts(const Eigen::MatrixXi& elements) {
+std::vector<int> parts_of_nodes(const Eigen::MatrixXi& elements) {
   std::vector<int> part(static_cast<std::size_t>(elements.size() == 0 ? 0 : elements.maxCoeff() + 1));
   std::iota(part.begin(), part.end(), 0);
   const auto up = [&](int n) -> int& { return part[static_cast<std::size_t>(n)]; };
@@ -274,6 +274,12 @@ int count_parts(const Eigen::MatrixXi& elements) {
       up(high) = low;
     }
   }
+  for (std::size_t n = 0; n < part.size(); ++n) part[n] = root(static_cast<int>(n));
+  return part;
+}
+
+int count_parts(const Eigen::MatrixXi& elements) {
+  const std::vector<int> part = parts_of_nodes(elements);
   int parts = 0;
   std::vector<char> is_used(part.size(), 0);
   for (const int node : elements.reshaped()) is_used[static_cast<std::size_t>(node)] = 1;

@@ -69,7 +69,10 @@ BodyOf<Dim> split_body(const FractureOf<Dim>& fracture, const BodyOf<Dim>& whole
 template <int Dim>
 Eigen::VectorXi whole_edges(const BodyOf<Dim>& whole, const BodyOf<Dim>& split, const Eigen::VectorXi& origin);
 
-/// How many parts that share no node the elements (a column each) make.
+/// Parts that share no node, which the elements (a column each) make: of each node up to the greatest that an element has, the least node
+/// of its part.
+std::vector<int> parts_of_nodes(const Eigen::MatrixXi& elements);
+/// How many they are.
 int count_parts(const Eigen::MatrixXi& elements);
 
 }  // namespace hydrostat::physics

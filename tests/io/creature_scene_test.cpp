@@ -84,6 +84,22 @@ delta_v_m_s = [0.0, 0.3, 0.0]
   EXPECT_NEAR(performer.scene.water->level - up.dot(world.pivot), -3, 1e-12);
 }
 
+/// What fills half of its cells displaces half as much; nothing is told to a body that nothing flows around.
+TEST_F(CreatureScenes, OfWaterOrAirTellTheBodyWhatItDisplaces) {
+  EXPECT_EQ(in("[ground]\nslope_deg = 3\n").scene.body.displaced_share.size(), 0);
+  physics::Body& body = plain.scene.body;
+  for (const double fill : {1.0, 0.5, 0.1}) {
+    plain.size = std::cbrt(fill * body.rest_volume.sum());
+    body.mass *= 1000 * std::pow(plain.size, 3) / body.mass.sum();
+    for (const char* text : {"[water]\n", "[water]\nlevel_m = 0.3\n"}) {
+      const physics::Body wet = in(text).scene.body;
+      ASSERT_EQ(wet.displaced_share.size(), wet.tet_count());
+      EXPECT_LT((wet.displaced_share.array() - fill).abs().maxCoeff(), 1e-9);
+      EXPECT_NEAR(1000 * wet.displaced_share.dot(wet.rest_volume), wet.mass.sum(), 1e-9 * wet.mass.sum());
+    }
+  }
+}
+
 TEST_F(CreatureScenes, WithoutGroundLeaveTheCreatureItsOwn) {
   plain.scene.ground.friction = 0.37;
   for (const char* text : {"[air]\nvelocity_m_s = [20.0, 0.0, 0.0]\n", "[ground]\nslope_deg = 3\n"}) {

@@ -39,13 +39,45 @@ Eigen::Matrix3d nearest_axis_turn(const Eigen::Matrix3d& wanted) {
   return nearest;
 }
 
-/// The turn and scale that let the bind pose stand as the character stands in a pose: the weighted mean of the bones' turns,
-/// made square to the axes, and the median of their scales.
-Eigen::Affine3d stand_upright(const Rig& rig, const std::vector<Eigen::Affine3d>& pose) {
-  std::vector<double> weight(pose.size(), 0.0), scales;
+/// Each bone's share in the skin [vertices].
+std::vector<double> weights_of_bones(const Rig& rig) {
+  std::vector<double> weight(static_cast<std::size_t>(rig.skeleton.count()), 0.0);
   for (const auto& influences : rig.skin.skin_weights) {
     for (const auto& influence : influences) weight[static_cast<std::size_t>(influence.bone)] += influence.weight;
   }
+  return weight;
+}
+
+/// Whether a pose shows most of the skin as its bind pose's mirror image: what scales a node above the skeleton by -1 is in the clip, and
+/// the inverse bind matrices need not know of it. No body moves from one to the other.
+bool is_mirrored(const Rig& rig, const std::vector<Eigen::Affine3d>& pose) {
+  const std::vector<double> weight = weights_of_bones(rig);
+  double mirrored = 0;
+  for (std::size_t b = 0; b < pose.size(); ++b) {
+    const double sign = pose[b].linear().determinant() * rig.skeleton.bind_pose[b].linear().determinant();
+    if (rig.skeleton.weighted[b] && sign != 0) mirrored += sign < 0 ? weight[b] : -weight[b];
+  }
+  return mirrored > 0;
+}
+
+/// Makes the bind pose its own mirror image across x, bone space staying as it is; the skin keeps its outside.
+void mirror_bind_pose(Rig& rig) {
+  const Eigen::Affine3d mirror(Eigen::Vector3d(-1, 1, 1).asDiagonal());
+  for (Eigen::Affine3d& bind : rig.skeleton.bind_pose) bind = mirror * bind;
+  rig.skin.vertices.row(0) *= -1;
+  for (retarget::MorphTarget& morph : rig.skin.morphs) morph.offsets.row(0) *= -1;
+  for (RigMesh& mesh : rig.meshes) {
+    if (mesh.normals.size() > 0) mesh.normals.row(0) *= -1;
+  }
+  rig.skin.triangles.row(1).swap(rig.skin.triangles.row(2));
+  rig.corners.row(1).swap(rig.corners.row(2));
+}
+
+/// The turn and scale that let the bind pose stand as the character stands in a pose: the weighted mean of the bones' turns,
+/// made square to the axes, and the median of their scales.
+Eigen::Affine3d stand_upright(const Rig& rig, const std::vector<Eigen::Affine3d>& pose) {
+  const std::vector<double> weight = weights_of_bones(rig);
+  std::vector<double> scales;
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
   for (std::size_t b = 0; b < pose.size(); ++b) {
     if (!rig.skeleton.weighted[b]) continue;
@@ -141,6 +173,7 @@ retarget::Character import_character(const std::string& path, const std::string&
   retarget::Character character;
   character.clip = sample(rig, scene, chosen, options, path);
   if (rig.skin.vertices.cols() == 0) add_capsules(rig, path);
+  if (is_mirrored(rig, character.clip.bone_pose.front())) mirror_bind_pose(rig);
   const Eigen::Affine3d upright = stand_upright(rig, character.clip.bone_pose.front());
   if (appearance) *appearance = build_appearance(scene, rig, split_turn(upright.linear()).rotation);
   character.skeleton = std::move(rig.skeleton);

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -158,6 +161,77 @@ INSTANTIATE_TEST_SUITE_P(Samples, SampleClip, testing::ValuesIn(kSampleClips), [
   std::replace(name.begin(), name.end(), '.', '_');
   return name;
 });
+
+// --- the same in a mirror
+
+/// A copy of a .glb, all that its scene holds below a node of this scale.
+std::string scaled_copy(const std::string& glb, const Eigen::Vector3d& scale, const std::filesystem::path& copy) {
+  std::ifstream in(glb, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  const auto word = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes.data() + at, 4);
+    return value;
+  };
+  nlohmann::json json = nlohmann::json::parse(bytes.substr(20, word(12)));
+  nlohmann::json& roots = json["scenes"][0]["nodes"];
+  json["nodes"].push_back({{"name", "mirror"}, {"scale", {scale.x(), scale.y(), scale.z()}}, {"children", roots}});
+  roots = {json["nodes"].size() - 1};
+  std::string text = json.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  const std::string rest = bytes.substr(20 + word(12));
+  std::ofstream out(copy, std::ios::binary);
+  const std::uint32_t head[5] = {word(0), word(4), static_cast<std::uint32_t>(20 + text.size() + rest.size()),
+                                 static_cast<std::uint32_t>(text.size()), word(16)};
+  out.write(reinterpret_cast<const char*>(head), sizeof head) << text << rest;
+  return copy.string();
+}
+
+double volume_of(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xi& triangles) {
+  double volume = 0;
+  for (const auto t : triangles.colwise()) volume += x.col(t[0]).dot(x.col(t[1]).cross(x.col(t[2]))) / 6;
+  return volume;
+}
+
+/// How far the normals that a look tells stand out of its triangles [m2].
+double outwardness(const Appearance& appearance, const Eigen::Matrix3Xd& x) {
+  double sum = 0;
+  for (const Appearance::Part& part : appearance.parts) {
+    if (part.normals.cols() == 0) continue;
+    for (const auto t : part.triangles.colwise()) {
+      const Eigen::Vector3d at = x.col(part.vertices[t[0]]), b = x.col(part.vertices[t[1]]) - at, c = x.col(part.vertices[t[2]]) - at;
+      for (const int corner : t) sum += b.cross(c).dot(part.normals.col(corner)) / 6;
+    }
+  }
+  return sum;
+}
+
+/// What the file's bind matrices know nothing of: a node above the skeleton that mirrors it.
+TEST(ImportCharacter, OfAMirroredClipIsItsMirrorImage) {
+  const TemporaryDirectory directory;
+  for (const char* file : {"boxdog_jump.glb", "worm_crawl.glb"}) {
+    Appearance plain_looks, looks;
+    const retarget::Character plain = import_character(kSamples + "/" + file, "", {30}, nullptr, &plain_looks);
+    for (const Eigen::Vector3d& scale : {Eigen::Vector3d(-1, 1, 1), Eigen::Vector3d(1, 1, -1), Eigen::Vector3d(-2, 2, 2),
+                                         Eigen::Vector3d(-1, 1, -1), Eigen::Vector3d(1, 1, 1)}) {
+      SCOPED_TRACE(std::string(file) + " under a scale of " + std::to_string(scale.x()) + ", " + std::to_string(scale.z()));
+      const retarget::Character seen = import_character(scaled_copy(kSamples + "/" + file, scale, directory.path / "copy.glb"), "", {30},
+                                                         nullptr, &looks);
+      ASSERT_EQ(seen.skin.vertices.cols(), plain.skin.vertices.cols());
+      const double size = scale.norm() * plain.skin.vertices.norm();
+      EXPECT_LT((seen.skin.vertices - scale.asDiagonal() * plain.skin.vertices).norm(), 1e-6 * size);
+      EXPECT_NEAR(volume_of(seen.skin.vertices, seen.skin.triangles),
+                  std::abs(scale.prod()) * volume_of(plain.skin.vertices, plain.skin.triangles), 1e-9);
+      EXPECT_NEAR(outwardness(looks, seen.skin.vertices), scale.y() * scale.y() * outwardness(plain_looks, plain.skin.vertices), 1e-6);
+      for (const Eigen::Affine3d& bind : seen.skeleton.bind_pose) EXPECT_NEAR(bind.linear().determinant(), 1, 1e-9);
+      ASSERT_EQ(seen.clip.frames(), plain.clip.frames());
+      for (Eigen::Index f = 0; f < seen.clip.frames(); ++f) {
+        EXPECT_LT((skin_positions(seen, f) - scale.asDiagonal() * skin_positions(plain, f)).norm(), 1e-6 * size);
+        for (const Eigen::Affine3d& pose : seen.clip.bone_pose[static_cast<std::size_t>(f)]) EXPECT_GT(pose.linear().determinant(), 0);
+      }
+    }
+  }
+}
 
 // --- small files of our own
 

@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "cli/command_line.h"
+#include "cli/place_option.h"
 #include "cli/progress.h"
 #include "io/batch_manifest.h"
 #include "io/batch_results.h"
@@ -252,7 +253,7 @@ void add_batch(CLI::App& app, int& exit_code) {
   batch->add_option("--jobs", options->jobs, "Conversions side by side")->check(CLI::Range(1, 256))->capture_default_str();
   batch->add_flag("--resume", options->resume,
                   "Skip jobs whose report is there and was made from the same clip and settings");
-  batch->add_option("-o,--out", options->out, "Directory of the results table [the manifest's]");
+  batch->add_option("-o,--out", options->out, "Directory of the results table [the manifest's]")->check(refuse_no_place);
   batch->add_option("--program", options->program, "What runs the conversions")
       ->group("");  // tests put another in its place
   batch->add_flag("--json", options->json, "Print the results as JSON");

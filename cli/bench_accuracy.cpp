@@ -10,6 +10,7 @@
 #include "cli/bench.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
+#include "cli/place_option.h"
 #include "cli/progress.h"
 #include "cli/subject.h"
 #include "io/accuracy_page.h"
@@ -332,7 +333,7 @@ void add_bench_accuracy(CLI::App& bench, int& exit_code) {
   CLI::App* sub =
       bench.add_subcommand("accuracy", "Error against time: methods, steps, elements, nodes (harmonics of a creature)");
   sub->add_option("SCENE|DIR", command->subject, "TOML file (README, 'Scene files') or creature")->required();
-  sub->add_option("-o,--out", command->out, "Directory for accuracy.csv, accuracy.svg and accuracy.html")->required();
+  sub->add_option("-o,--out", command->out, "Directory for accuracy.csv, accuracy.svg and accuracy.html")->check(refuse_no_place)->required();
   sub->add_option("--max-error", command->max_error, "The error, 1% or 0.01 of L, within which the cheapest is marked [1%, or the least that can be told]")
       ->check(refuse_empty);
   sub->add_option("--duration", command->duration, "Seconds of the motion that are compared, at most [1]")

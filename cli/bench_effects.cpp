@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -8,6 +9,7 @@
 #include "cli/bench.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
+#include "cli/place_option.h"
 #include "cli/subject.h"
 #include "io/creature_scene.h"
 #include "io/effects_page.h"
@@ -59,23 +61,31 @@ int effects(const EffectsCommand& command) {
   io::write_file(out / "effects.csv", io::effects_csv(rows));
   io::write_file(out / "effects.svg", io::effects_svg(name, rows));
   io::write_file(out / "effects.html", io::effects_page(name, rows));
-  char text[160];
-  for (const retarget::EffectRow& row : rows) {
-    std::snprintf(text, sizeof text, "%-13s %9.3f ms a second, moves it by %8.3f %% L; all others: %9.3f ms, %8.3f %% L from all\n",
-                  row.effect.c_str(), row.ms_per_sim_s, 100 * row.difference_length, row.without_ms_per_sim_s,
-                  100 * row.without_difference_length);
-    std::cout << text;
-  }
+  for (const retarget::EffectRow& row : rows) std::cout << effect_line(row) << "\n";
   return kDone;
 }
 
+/// What diverges goes far: its digits before the point would fill lines.
+std::string in_digits(double value, int width) {
+  char text[40];
+  std::snprintf(text, sizeof text, std::abs(value) < 1e6 ? "%*.3f" : "%*.3g", width, value);
+  return text;
+}
+
 }  // namespace
+
+std::string effect_line(const retarget::EffectRow& row) {
+  std::string name = row.effect;
+  name.resize(std::max<std::size_t>(13, name.size()), ' ');
+  return name + " " + in_digits(row.ms_per_sim_s, 9) + " ms a second, moves it by " + in_digits(100 * row.difference_length, 8) + " % L; all others: " +
+         in_digits(row.without_ms_per_sim_s, 9) + " ms, " + in_digits(100 * row.without_difference_length, 8) + " % L from all";
+}
 
 void add_bench_effects(CLI::App& bench, int& exit_code) {
   const auto command = std::make_shared<EffectsCommand>();
   CLI::App* sub = bench.add_subcommand("effects", "A scene or creature without effects, with each of its own alone, and with all");
   sub->add_option("SCENE|DIR", command->subject, "TOML file (README, 'Scene files') or creature")->required();
-  sub->add_option("-o,--out", command->out, "Directory for effects.csv, effects.svg and effects.html")->required();
+  sub->add_option("-o,--out", command->out, "Directory for effects.csv, effects.svg and effects.html")->check(refuse_no_place)->required();
   sub->add_option("--duration", command->duration, "Seconds to simulate, at most [2]")->check(number_within(0.01, 60));
   sub->callback([command, &exit_code] { exit_code = effects(*command); });
 }

@@ -11,6 +11,7 @@
 
 #include "cli/command_line.h"
 #include "cli/import_options.h"
+#include "cli/place_option.h"
 #include "io/import_worker.h"
 #include "io/writable.h"
 #include "io/write_file.h"
@@ -90,7 +91,7 @@ void add_bench_import(CLI::App& bench, int& exit_code) {
   const auto command = std::make_shared<ImportBench>();
   CLI::App* sub = bench.add_subcommand("import", "Time and memory of reading clips");
   sub->add_option("CLIP", command->clips, "Clip files, or directories of such")->required();
-  sub->add_option("-o,--out", command->out, "Directory for import.csv")->required();
+  sub->add_option("-o,--out", command->out, "Directory for import.csv")->check(refuse_no_place)->required();
   add_import_options(*sub, command->import);
   sub->callback([command, &exit_code] { exit_code = bench_import(*command); });
 }

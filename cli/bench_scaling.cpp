@@ -9,6 +9,7 @@
 #include "cli/bench.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
+#include "cli/place_option.h"
 #include "cli/progress.h"
 #include "io/scaling_page.h"
 #include "io/scene_file.h"
@@ -121,7 +122,7 @@ void add_bench_scaling(CLI::App& bench, int& exit_code) {
   CLI::App* sub = bench.add_subcommand("scaling", "Cost of a scene's body in meshes from 200 elements up");
   sub->add_option("SCENE", command->scene, "TOML file (README, 'Scene files'), or '-': a bar of stable neo-Hookean tets")
       ->required();
-  sub->add_option("-o,--out", command->out, "Directory for scaling.csv and scaling.html")->required();
+  sub->add_option("-o,--out", command->out, "Directory for scaling.csv and scaling.html")->check(refuse_no_place)->required();
   sub->add_option("--method", command->method, "Time integration [the scene's]")->check(CLI::IsMember(io::method_names()));
   sub->add_option("--threads", command->threads, "Of the second measurement; the first is on one")
       ->check(number_within(2, 256));

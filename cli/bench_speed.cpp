@@ -12,6 +12,7 @@
 #include "cli/import_options.h"
 #include "cli/make_performer.h"
 #include "cli/number_option.h"
+#include "cli/place_option.h"
 #include "cli/progress.h"
 #include "io/import_worker.h"
 #include "io/write_file.h"
@@ -242,7 +243,7 @@ void add_bench_speed(CLI::App& bench, int& exit_code) {
   const auto command = std::make_shared<SpeedCommand>();
   CLI::App* sub = bench.add_subcommand("speed", "What each stage of a conversion costs, at several numbers of nodes");
   sub->add_option("CLIP", command->clip_file, "FBX, glTF, ... as for 'hydrostat convert'")->required();
-  sub->add_option("-o,--out", command->out, "Directory for speed.csv")->required();
+  sub->add_option("-o,--out", command->out, "Directory for speed.csv")->check(refuse_no_place)->required();
   sub->add_option("--clip", command->clip, "Clip by name or index [the first that lasts]");
   sub->add_option("--nodes", command->nodes, "Wished numbers of control nodes")->capture_default_str();
   sub->add_option("--duration", command->duration, "Seconds to simulate, at most")

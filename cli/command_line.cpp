@@ -14,6 +14,12 @@ std::string subcommand_in_use(const CLI::App& app) {
   return chosen.empty() ? "hydrostat" : "hydrostat " + chosen.front()->get_name();
 }
 
+/// CLI11 would tell them last to first.
+std::string not_expected(const CLI::App& app) {
+  const std::vector<std::string> words = app.remaining(/*recurse=*/true);
+  return (words.size() > 1 ? "The following arguments were not expected: " : "The following argument was not expected: ") + CLI::detail::join(words, " ");
+}
+
 /// CLI11 writes "--jobs: Value 0 not in range", "Could not convert: --jobs = 1.5" or "CLIP is required": the option moves to the
 /// place of the message.
 UsageError usage_error(const CLI::App& app, const CLI::ParseError& error) {
@@ -21,7 +27,7 @@ UsageError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   if (app.get_subcommands().empty() && !app.remaining().empty()) {
     return {command, "command line", "'" + app.remaining().front() + "' is no subcommand", "'hydrostat --help' lists them."};
   }
-  std::string what = error.what();
+  std::string what = dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr ? error.what() : not_expected(app);
   std::string where = "command line";
   const std::string unreadable = "Could not convert: ";
   if (const std::size_t equals = what.find(" = "); what.starts_with(unreadable + "--") && equals != std::string::npos) {

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "cli/command_line.h"
+#include "cli/place_option.h"
 #include "io/comparison.h"
 
 namespace hydrostat::cli {
@@ -121,7 +122,7 @@ void add_compare(CLI::App& app, int& exit_code) {
   sub->add_option("DIR", command->subjects,
                   "Creatures, directories of 'simulate', or report pages; the others are held against the first")
       ->required();
-  sub->add_option("-o,--out", command->out, "Write a page with all motions, to this .html file");
+  sub->add_option("-o,--out", command->out, "Write a page with all motions, to this .html file")->check(refuse_no_place);
   sub->add_flag("--json", command->json, "Print the comparison as JSON");
   sub->callback([command, &exit_code] { exit_code = compare(*command); });
 }

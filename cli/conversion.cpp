@@ -247,6 +247,7 @@ void Conversion::let_go() {
   const bool leaps_on = plan.target.loop && retarget::has_flight(plan);
   if (wants_polish(options_, leaps_on) && !is_down(performances_.main())) polish();
   add_warnings(retarget::feedback_warnings(performances_));
+  add_warnings(retarget::motion_warnings(performances_.main().report));
   if (chosen_) target_.report.accuracy = told(*chosen_);
   report_replays(performances_, target_.report);
   stages_.run("measurement", [&] {

@@ -27,6 +27,7 @@ io::ImportedCharacter import(const ConvertOptions& options) {
 int convert(const ConvertOptions& options) {
   const double limit = wished_limit(options);
   const retarget::CreatureOptions settings = creature_options(options);
+  if (options.accuracy.is_asked()) options.accuracy.most("hydrostat convert");  // refused now, not after the body is made
   Progress progress(std::cerr, progress_style(options.quiet));
   Stages stages(progress);
   const io::ImportedCharacter imported = stages.run("import", [&] { return import(options); });
@@ -35,14 +36,17 @@ int convert(const ConvertOptions& options) {
   Conversion conversion(options, settings, stages, writer);
   try {
     conversion.run(imported, limit);
+  } catch (const UsageError&) {  // of no file
+    throw;
   } catch (const Error& error) {
     throw writer.as_seen(error);
   }
   writer.commit();
   const retarget::Replay& run = conversion.performances().main();
   const std::string motion_file = (fs::path(options.out) / "failed.glb").string();
+  const std::string way_up = is_down(run) ? "try " + change_of_conversion(run) : "";
   const int exit_code =
-      options.json ? tell_report(run, options.out, motion_file, conversion.report()) : tell_run(run, options.out, motion_file);
+      options.json ? tell_report(run, options.out, motion_file, conversion.report(), way_up) : tell_run(run, options.out, motion_file, way_up);
   const retarget::AccuracyReport& accuracy = conversion.report().accuracy;
   if (!options.json) std::cout << saved_words(conversion.report());
   if (exit_code != kDone || accuracy.is_met()) return exit_code;

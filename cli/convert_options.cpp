@@ -6,6 +6,7 @@
 
 #include "cli/command_line.h"
 #include "cli/number_option.h"
+#include "cli/place_option.h"
 #include "cli/wobble_option.h"
 
 namespace hydrostat::cli {
@@ -83,7 +84,7 @@ double wished_limit(const ConvertOptions& options) {
 void add_convert_options(CLI::App& app, ConvertOptions& options) {
   options.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   app.add_option("CLIP", options.clip_file, "FBX, glTF, ... with a skeleton, a skin and a clip")->required();
-  app.add_option("-o,--out", options.out, "Directory of the creature")->required();
+  app.add_option("-o,--out", options.out, "Directory of the creature")->check(refuse_no_place)->required();
   app.add_option("--clip", options.clip, "Clip by name or index [the first that lasts]");
   app.add_option("--from", options.import.from_s, "Where in the clip to begin, counted from its first key [s]")
       ->check(number_within(0, 3600))
@@ -118,7 +119,7 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
   app.add_option("--friction", options.friction, "Coulomb's coefficient of the ground")
       ->check(number_within(0.05, 5))
       ->capture_default_str();
-  app.add_option("--scene", options.scene, "World to let it go in, a TOML file (README, 'A creature's scene')");
+  app.add_option("--scene", options.scene, "World to let it go in, a TOML file (README, 'A creature's scene')")->check(refuse_no_place);
   add_wobble_option(app, options.wobble,
                     "Whether flesh swings over what the nodes carry, in the picture alone; auto: where it is seen");
   app.add_option("--polish", options.polish,

@@ -67,7 +67,7 @@ UsageError no_level_within(const std::string& command, double budget_ms, const s
 std::string way_up(const LevelTrial& trial, bool by_budget) {
   if (!trial.found) {
     if (trial.lost.empty()) return "";
-    return "it falls or gets nowhere on levels " + of_nodes(trial.lost) + ", too: try a higher --limit, more --nodes or a calmer clip";
+    return "it falls or gets nowhere on levels " + of_nodes(trial.lost) + ", too: convert again with more --nodes or a calmer clip";
   }
   const int nodes = trial.found->wished > 0 ? trial.found->wished : trial.found->nodes;
   const std::string option = by_budget ? "--budget " + budget_for(*trial.found) : "--lod " + std::to_string(nodes);

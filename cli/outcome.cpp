@@ -1,5 +1,7 @@
 #include "cli/outcome.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 
@@ -11,12 +13,36 @@
 #include "io/write_file.h"
 #include "retarget/body_material.h"
 #include "retarget/effects.h"
+#include "retarget/run_warnings.h"
 #include "retarget/wobble_plan.h"
 
 namespace hydrostat::cli {
 
+namespace {
+
+constexpr double kAtLimit = 0.05;     // share of the constraints from which the limit is to blame
+constexpr double kBeforeFall = 0.3;   // [s]
+
+/// Of the constraints, the most at any time from shortly before the fall on.
+double share_at_limit(const retarget::Replay& replay) {
+  double most = 0;
+  for (Eigen::Index k = 0; k < replay.course.time_s.size(); ++k) {
+    if (replay.course.time_s[k] >= replay.report.fall_time_s - kBeforeFall) most = std::max(most, replay.course.saturated[k]);
+  }
+  return most;
+}
+
+}  // namespace
+
 bool is_down(const retarget::Replay& replay) {
   return replay.report.fell || replay.termination == physics::Termination::kDiverged;
+}
+
+std::string change_of_conversion(const retarget::Replay& replay) {
+  if (replay.termination == physics::Termination::kDiverged) return "--method euler or more --nodes";
+  const double share = share_at_limit(replay);
+  if (share < kAtLimit) return "more --nodes or a calmer clip";
+  return "a higher --limit (" + std::to_string(std::lround(100 * share)) + " % of all constraints were at the present one), more --nodes or a calmer clip";
 }
 
 void report_replays(const retarget::Performances& performances, retarget::RunReport& report) {
@@ -86,21 +112,21 @@ namespace {
 
 /// How long the creature stays up, and how near to target and clip.
 std::string summary(const retarget::ReplayReport& report, const std::string& where) {
-  char text[300];
+  char text[300], drift[60] = "", assist[60] = "";
+  if (!std::isnan(report.drift_per_cycle_length)) std::snprintf(drift, sizeof drift, ", drift %.2f %% L a cycle", 100 * report.drift_per_cycle_length);
+  if (retarget::is_assisted(report)) std::snprintf(assist, sizeof assist, "; assisted from outside by up to %.2g mg", report.external_assist_mg);
   std::snprintf(text, sizeof text,
                 ": up for %.2f s (%.3g cycles); shape %.2f %% L from the target, %.2f %% L from the clip; travel %.3f L a cycle "
-                "(clip %.3f), drift %.2f %% L a cycle; %.2fx real time",
+                "(clip %.3f)%s%s; %.2fx real time",
                 report.duration_s, report.cycles, 100 * report.shape_rms_length, 100 * report.clip_shape_rms_length,
-                report.travel_per_cycle_length, report.clip_travel_per_cycle_length, 100 * report.drift_per_cycle_length,
-                report.real_time_factor);
+                report.travel_per_cycle_length, report.clip_travel_per_cycle_length, drift, assist, report.real_time_factor);
   return where + text;
 }
 
 std::string failure(const retarget::Replay& run, const std::string& where, const std::string& motion_file, const std::string& way_up) {
   const bool diverged = run.termination == physics::Termination::kDiverged;
-  const std::string usual = diverged ? "try --method euler or more --nodes" : "try a higher --limit, more --nodes or a calmer clip";
   return one_line({where, "replay", diverged ? run.report.fall_cause : "the creature fell: " + run.report.fall_cause,
-                   motion_file + " shows it; " + (way_up.empty() ? usual : way_up)});
+                   motion_file + " shows it" + (way_up.empty() ? "" : "; " + way_up)});
 }
 
 }  // namespace

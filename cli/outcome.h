@@ -12,6 +12,9 @@ namespace hydrostat::cli {
 /// Whether the run fell or diverged.
 bool is_down(const retarget::Replay& replay);
 
+/// What to give 'convert' where the run is down, after a verb: a higher --limit only where a telling share of the constraints was at theirs.
+std::string change_of_conversion(const retarget::Replay& replay);
+
 /// Puts the replays' figures into the report.
 void report_replays(const retarget::Performances& performances, retarget::RunReport& report);
 
@@ -29,7 +32,7 @@ void measure(const retarget::Performer& performer, const retarget::SignalSet& si
              retarget::RunReport& report);
 
 /// Last words of a command. Standard output gets one line of figures, or the report as JSON; standard error, where the run is down,
-/// one line with the cause and with `way_up`, what to do then; empty: what goes for any creature. Returns the exit code.
+/// one line with the cause and with `way_up`, what to do then, where that is known. Returns the exit code.
 int tell_run(const retarget::Replay& run, const std::string& where, const std::string& motion_file, const std::string& way_up = "");
 int tell_report(const retarget::Replay& run, const std::string& where, const std::string& motion_file,
                 const retarget::RunReport& report, const std::string& way_up = "");

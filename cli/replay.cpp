@@ -12,6 +12,7 @@
 #include "cli/level_trial.h"
 #include "cli/number_option.h"
 #include "cli/outcome.h"
+#include "cli/place_option.h"
 #include "cli/stages.h"
 #include "cli/wobble_option.h"
 #include "io/creature_scene.h"
@@ -259,6 +260,12 @@ void warn_of_lost_way(const retarget::Replay& run, std::vector<std::string>& war
   warnings.emplace_back(text);
 }
 
+/// A push may fell any creature.
+std::string usual_way_up(const ReplayCommand& command, const retarget::Replay& run) {
+  if (command.open_loop) return "leave --open-loop out";
+  return command.pushes.empty() ? "convert again with " + change_of_conversion(run) : "";
+}
+
 /// Where no report does.
 void tell_accuracy(const ChosenStep& chosen, const retarget::Performer& performer) {
   retarget::RunReport run;
@@ -311,9 +318,11 @@ int replay(const ReplayCommand& command) {
     take_steps(options.replay, chosen->setting);
     performances = perform();
   }
-  const std::string way_up = is_down(performances.main()) ? levels.way_up(creature) : "";
+  std::string way_up = is_down(performances.main()) ? levels.way_up(creature) : "";
+  if (way_up.empty() && is_down(performances.main())) way_up = usual_way_up(command, performances.main());
   std::vector<std::string>& warnings = creature.target.report.warnings;
   for (const std::string& warning : retarget::feedback_warnings(performances, options.feedback)) warnings.push_back(warning);
+  for (const std::string& warning : retarget::motion_warnings(performances.main().report)) warnings.push_back(warning);
   options.feedback = performances.feedback;
   if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
   const bool is_met = !chosen || chosen->report.is_met();
@@ -364,13 +373,14 @@ void add_replay(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<ReplayCommand>();
   CLI::App* replay_command = app.add_subcommand("replay", "Simulate a creature again, with its signals as they now are");
   replay_command->add_option("DIR", command->directory, "Creature, as convert wrote it")->required();
-  CLI::Option* out = replay_command->add_option("-o,--out", command->out, "Write the motion alone, to this .glb file");
+  CLI::Option* out = replay_command->add_option("-o,--out", command->out, "Write the motion alone, to this .glb file")->check(refuse_no_place);
   CLI::Option* duration = replay_command->add_option("--duration", command->duration, "Seconds to simulate [15 cycles, 10 s at most]")
                               ->check(number_within(0.1, kLongest));
   replay_command->add_option("--cycles", command->cycles, "The same in periods of the clip")
       ->check(number_within(0.1, 10000))
       ->excludes(duration);
-  replay_command->add_option("--scene", command->scene, "World to let it go in, a TOML file (README, 'A creature's scene') [the creature's]");
+  replay_command->add_option("--scene", command->scene, "World to let it go in, a TOML file (README, 'A creature's scene') [the creature's]")
+      ->check(refuse_no_place);
   replay_command->add_flag("--open-loop", command->open_loop, "Leave the corrector out");
   replay_command->add_option("--push", command->pushes, "t=2,dv=0.3:0:0: a force on the whole body for 0.1 s from t [s] on that would "
                                                         "change its velocity by dv [m/s]; may be given several times")
@@ -382,7 +392,8 @@ void add_replay(CLI::App& app, int& exit_code) {
   }
   add_wobble_option(*replay_command, command->wobble, "See 'hydrostat convert --help' [the creature's]");
   CLI::Option* seed = replay_command->add_option("--seed", command->seed, "See 'hydrostat convert --help' [the creature's]");
-  CLI::Option* trace = replay_command->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
+  CLI::Option* trace = replay_command->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files")
+                             ->check(refuse_no_place);
   replay_command->add_option("--trace-rate", command->trace_rate, "Rows a second, a whole part of the 120 of the control")
       ->check(number_within(0.1, 1e6))
       ->needs(trace);

@@ -183,6 +183,8 @@ void append(const SignalsOptions& options, const SignalSet& before, const signal
   if (!broken.empty()) throw usage(option, broken, "'hydrostat signals DIR list' tells the kind and the harmonics.");
   const std::vector<int> channels = chosen_channels(options, layer.selection, set);
   set.layers.push_back(layer);
+  const std::string too_large = signal::broken_rule(set.layers, set.activation, set.channels, retarget::kPassiveActivation);
+  if (!too_large.empty()) throw usage(option, too_large, "Give less, or drop earlier layers with 'hydrostat signals DIR reset'.");
   const retarget::EditedActivations edited = retarget::edited_activations(set);
   io::write_signals(signals_path(options), set);
   std::cout << "layer " << set.layers.size() << " " << description(layer) << ": " << channels.size() << " channels touched; "

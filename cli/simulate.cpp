@@ -11,6 +11,7 @@
 #include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
+#include "cli/place_option.h"
 #include "cli/stages.h"
 #include "io/creature_directory.h"
 #include "io/creature_record.h"
@@ -212,7 +213,7 @@ int simulate(const SimulateCommand& command) {
       throw UsageError(kCommand, "option --trace", "'" + command.trace + "' is where the outcome goes", "Name another folder, which may lie in it.");
     }
   }
-  io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh);
+  io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh, io::CreatureWriter::Kind::simulation);
   retarget::RunReport report;
   std::optional<ChosenStep> chosen;
   if (command.accuracy.is_asked()) {
@@ -270,14 +271,14 @@ void add_simulate(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<SimulateCommand>();
   CLI::App* sub = app.add_subcommand("simulate", "Simulate a scene without a clip: shapes, materials, obstacles, signals");
   sub->add_option("SCENE", command->scene, "TOML file (README, 'Scene files')")->required();
-  sub->add_option("-o,--out", command->out, "Directory for motion, report and page; replaced as a whole")->required();
+  sub->add_option("-o,--out", command->out, "Directory for motion, report and page; replaced as a whole")->check(refuse_no_place)->required();
   sub->add_option("--method", command->method, "Time integration [the scene's]")->check(CLI::IsMember(io::method_names()));
   sub->add_option("--duration", command->duration, "Seconds to simulate [the scene's]")
       ->check(number_within(1e-3, kLongest));
   add_accuracy_options(*sub, command->accuracy);
   CLI::Option* seed = sub->add_option("--seed", command->seed, "Of a random start [the scene's]");
   CLI::Option* trace =
-      sub->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files");
+      sub->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files")->check(refuse_no_place);
   sub->add_option("--trace-rate", command->trace_rate,
                   "Rows a second, a whole part of the scene's steps a second [all steps]")
       ->check(number_within(0.01, 1e6))

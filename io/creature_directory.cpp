@@ -12,6 +12,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "io/creature_record.h"
 #include "io/write_file.h"
 
 namespace hydrostat::io {
@@ -66,7 +67,25 @@ void remove_leftovers(const fs::path& creature) {
   }
 }
 
-void refuse_what_is_no_creature(const fs::path& creature, const fs::path& shown_as, CreatureWriter::Start start) {
+/// A record that cannot be read is a creature's, whose making took longer.
+CreatureWriter::Kind kind_of(const fs::path& creature) {
+  try {
+    for (const auto& [name, value] : read_creature_record(creature).settings) {
+      if (name == "kind" && value == CreatureRecord::Setting("scene")) return CreatureWriter::Kind::simulation;
+    }
+  } catch (const Error&) {
+  }
+  return CreatureWriter::Kind::creature;
+}
+
+void refuse_the_other_kind(const fs::path& creature, const fs::path& shown_as, CreatureWriter::Kind kind) {
+  if (kind_of(creature) == kind) return;
+  const char* what = kind == CreatureWriter::Kind::simulation ? "holds a creature, which a simulation would replace"
+                                                              : "holds a scene's simulation, which a creature would replace";
+  throw Error(shown_as.string(), "", what, "Give another directory, or remove this one first.");
+}
+
+void refuse_what_is_no_creature(const fs::path& creature, const fs::path& shown_as, CreatureWriter::Start start, CreatureWriter::Kind kind) {
   std::error_code failed;
   const fs::file_status status = fs::status(creature, failed);
   if (fs::exists(status) && !fs::is_directory(status)) {
@@ -78,6 +97,7 @@ void refuse_what_is_no_creature(const fs::path& creature, const fs::path& shown_
     throw Error(shown_as.string(), "", "holds no creature (no creature.toml)",
                 "Make one with 'hydrostat convert CLIP -o DIR'.");
   }
+  if (holds_creature) refuse_the_other_kind(creature, shown_as, kind);
   if (!fs::exists(status) || holds_creature) return;
   const fs::directory_iterator content(creature, failed);
   if (failed) throw directory_error(shown_as, failed.value());
@@ -119,9 +139,9 @@ bool is_creature(const fs::path& directory) {
   return fs::is_regular_file(directory / "creature.toml", ignored);
 }
 
-CreatureWriter::CreatureWriter(const fs::path& creature, Start start) : creature_(place_of(creature)), shown_as_(creature) {
+CreatureWriter::CreatureWriter(const fs::path& creature, Start start, Kind kind) : creature_(place_of(creature)), shown_as_(creature) {
   remove_leftovers(creature_);
-  refuse_what_is_no_creature(creature_, shown_as_, start);
+  refuse_what_is_no_creature(creature_, shown_as_, start, kind);
   std::error_code failed;
   fs::create_directories(creature_.parent_path(), failed);
   if (failed) throw directory_error(shown_as_, failed.value());

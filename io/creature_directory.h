@@ -13,15 +13,17 @@ namespace hydrostat::io {
 /// process killed before, an existing creature stays as it was. What killed runs left beside it is removed by the next
 /// writer of that creature.
 ///
-/// An existing directory is taken only when it is empty or holds a creature (creature.toml): Error otherwise, and also when
-/// the path is a file or cannot be written. Files of the user's in a creature are carried over.
+/// An existing directory is taken only when it is empty or holds what the new one is, a creature or a scene's simulation (both have a
+/// creature.toml, which tells): Error otherwise, and also when the path is a file or cannot be written. Files of the user's in it are
+/// carried over.
 class CreatureWriter {
  public:
   enum class Start {
     afresh,  // a creature made anew: of the old one, the stage cache and what hydrostat did not write are kept
     amended  // the old creature with all its files, some of which are about to be replaced; Error when there is none
   };
-  CreatureWriter(const std::filesystem::path& creature, Start start);
+  enum class Kind { creature, simulation };
+  CreatureWriter(const std::filesystem::path& creature, Start start, Kind kind = Kind::creature);
   ~CreatureWriter();
   CreatureWriter(const CreatureWriter&) = delete;
   CreatureWriter& operator=(const CreatureWriter&) = delete;

@@ -1,11 +1,15 @@
 #include "io/load_creature.h"
 
+#include <algorithm>
 #include <array>
+#include <limits>
+#include <optional>
 
 #include "io/body_file.h"
 #include "io/creature_directory.h"
 #include "io/path_file.h"
 #include "io/signals_file.h"
+#include "io/toml_reader.h"
 #include "io/wobble_file.h"
 #include "io/write_file.h"
 #include "retarget/error.h"
@@ -14,7 +18,54 @@
 namespace hydrostat::io {
 namespace {
 
+using Setting = CreatureRecord::Setting;
+
 constexpr const char* kMend = "Make the creature again with 'hydrostat convert'.";
+constexpr double kMostSeed = std::numeric_limits<unsigned>::max();
+constexpr double kLongestStep = 1.0 / 120;  // [s], of the control
+
+/// As it stands in the file.
+std::string in_words(const Setting& value) {
+  std::string line = to_toml({"", "", "", 0, {{"x", value}}, {}});
+  line = line.substr(line.find("\nx = ") + 5);
+  return line.substr(0, line.find('\n'));
+}
+
+Error setting_error(const std::string& file, const std::string& name, const Setting& value, const std::string& allowed) {
+  return {file, "setting '" + name + "'", "is " + in_words(value) + ", where " + allowed + " belongs",
+          "Mend the value, or make the creature again with 'hydrostat convert'."};
+}
+
+/// The words that a text may be.
+std::optional<std::vector<std::string>> words_of(const std::string& name) {
+  if (name == "wobble") return {{"auto", "on", "off"}};
+  if (name != "method") return std::nullopt;
+  std::vector<std::string> names;
+  for (const physics::Method method : physics::kMethods) names.push_back(physics::name_of(method));
+  return names;
+}
+
+struct NumberRule {
+  const char* name;
+  Within within;
+  bool is_whole = false;
+  const char* allowed;
+};
+constexpr Within kFactor{.least = 0, .most = 1e6, .without_least = true};
+constexpr NumberRule kNumberRules[] = {{"corrector_effort", kFactor, false, "a number above 0 and at most 1e6"},
+                                       {"corrector_horizon", kFactor, false, "a number above 0 and at most 1e6"},
+                                       {"corrector_root_weight", kFactor, false, "a number above 0 and at most 1e6"},
+                                       {"corrector_regulator", {.least = 0, .most = 1e6}, false, "a number from 0 to 1e6"},
+                                       {"step_s", {.least = 1e-7, .most = kLongestStep}, false, "a number of seconds from 1e-7 to 1/120"},
+                                       {"seed", {.least = 0, .most = kMostSeed}, true, "a whole number from 0 to 4294967295"}};
+
+bool keeps(const NumberRule& rule, const Setting& value) {
+  const auto* whole = std::get_if<std::int64_t>(&value);
+  const auto* number = std::get_if<double>(&value);
+  if (whole == nullptr && (number == nullptr || rule.is_whole)) return false;
+  const double told = whole != nullptr ? static_cast<double>(*whole) : *number;
+  return told >= rule.within.least && told <= rule.within.most && !(rule.within.without_least && told == rule.within.least);
+}
 
 bool has_states(const retarget::ContactSchedule& contacts, Eigen::Index points, Eigen::Index frames) {
   if (contacts.touching.rows() != points || contacts.touching.cols() != frames) return false;
@@ -64,6 +115,7 @@ LoadedCreature load_creature(const std::filesystem::path& creature) {
   if (setting(loaded.record, "kind", "") == "scene") {
     throw Error(creature.string(), "", "holds a scene's simulation, not a creature", "Simulate the scene again with 'hydrostat simulate'.");
   }
+  check_settings(loaded.record, (creature / "creature.toml").string());
   loaded.target = parse_target(read_file(target_file), target_file.string());
   loaded.target.performer.clip_rise = loaded.record.clip_rise_m;
   parse_body(read_file(body_file), body_file.string(), loaded.target.performer);
@@ -108,6 +160,23 @@ retarget::CreatureOptions level_options(const LoadedCreature& loaded) {
     if (const bool* is_on = std::get_if<bool>(&value); is_on != nullptr && name == "calibrated") options.calibrated = *is_on;
   }
   return options;
+}
+
+void check_settings(const CreatureRecord& record, const std::string& file) {
+  for (const auto& [name, value] : record.settings) {
+    if (name == "calibrated" && !std::holds_alternative<bool>(value)) throw setting_error(file, name, value, "true or false");
+    if (const auto words = words_of(name)) {
+      const auto* text = std::get_if<std::string>(&value);
+      if (text == nullptr || std::find(words->begin(), words->end(), *text) == words->end()) {
+        std::string all;
+        for (const std::string& word : *words) all += (all.empty() ? "one of " : ", ") + word;
+        throw setting_error(file, name, value, all);
+      }
+    }
+    for (const NumberRule& rule : kNumberRules) {
+      if (name == rule.name && !keeps(rule, value)) throw setting_error(file, name, value, rule.allowed);
+    }
+  }
 }
 
 double setting(const CreatureRecord& record, const std::string& name, double otherwise) {

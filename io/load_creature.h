@@ -16,7 +16,7 @@ struct LoadedCreature {
 };
 
 /// Reads creature.toml, body.json, target.bin, signals.json and, where there are any, appearance.bin, morphs.bin, path.bin and wobble.bin; the
-/// cache is not needed. Throws Error where a file is missing, damaged, or does not belong to the others.
+/// cache is not needed. Throws Error where a file is missing, damaged, or does not belong to the others, or by check_settings.
 LoadedCreature load_creature(const std::filesystem::path& creature);
 
 /// Reads rig.bin, which other levels of detail are made from. Throws Error as above.
@@ -24,6 +24,9 @@ retarget::Rig load_rig(const std::filesystem::path& creature, const LoadedCreatu
 
 /// The elements, material and friction that a creature was made with, as its levels want them.
 retarget::CreatureOptions level_options(const LoadedCreature& loaded);
+
+/// Refuses settings that a creature cannot be let go by: Error that names `file`, the key, its value and what is allowed. Others are only told.
+void check_settings(const CreatureRecord& record, const std::string& file);
 
 /// A setting of creature.toml as a number or text, or `otherwise` where there is none of that kind.
 double setting(const CreatureRecord& record, const std::string& name, double otherwise);

@@ -23,6 +23,14 @@ class Group {
       warnings_.push_back("report: " + name_ + "." + key + " is not a finite number; it is written as null.");
     }
   }
+  /// A figure that not every run tells: what is no number is null, and nothing to warn of.
+  void add_if_told(const char* key, double value) {
+    if (std::isnan(value)) {
+      add_nothing(key);
+    } else {
+      add(key, value);
+    }
+  }
   void add(const char* key, int value) { json_[key] = value; }
   void add(const char* key, bool value) { json_[key] = value; }
   void add(const char* key, const std::string& value) { json_[key] = value; }
@@ -111,8 +119,8 @@ void fill(Group& group, const retarget::ReplayReport& replay) {
   group.add("shape_rms_length", replay.shape_rms_length);
   group.add("clip_shape_rms_length", replay.clip_shape_rms_length);
   group.add("world_rms_length", replay.world_rms_length);
-  group.add("drift_per_cycle_length", replay.drift_per_cycle_length);
-  group.add("heading_deg_per_cycle", replay.heading_deg_per_cycle);
+  group.add_if_told("drift_per_cycle_length", replay.drift_per_cycle_length);
+  group.add_if_told("heading_deg_per_cycle", replay.heading_deg_per_cycle);
   group.add("travel_per_cycle_length", replay.travel_per_cycle_length);
   group.add("clip_travel_per_cycle_length", replay.clip_travel_per_cycle_length);
   group.add("slip_per_stance_length", replay.slip_per_stance_length);

@@ -367,6 +367,8 @@ SignalSet parse_signals(const std::string& text, const std::string& file) {
   }
   const Place layers = root.at("layers");
   for (std::size_t l = 0; l < layers.list_size(); ++l) set.layers.push_back(read_layer(layers.entry(l), kind, samples));
+  const std::string too_large = signal::broken_rule(set.layers, set.activation, set.channels, retarget::kPassiveActivation);
+  if (!too_large.empty()) layers.refuse(too_large, "Give it a smaller number, or drop it.");
   return set;
 }
 

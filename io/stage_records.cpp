@@ -209,8 +209,8 @@ void name_fields(RecordArchive& archive, retarget::ReplayReport& report) {
                  report.clip_travel_per_cycle_length, "slip", report.slip_per_stance_length, "held_slip",
                  report.held_slip_per_stance_length, "sole_gap", report.sole_gap_length, "penetration", report.penetration_max_size, "volume_error", report.volume_error_max,
                  "momentum_residual", report.momentum_residual_mg, "angular_residual", report.angular_residual_mgl,
-                 "external_assist", report.external_assist_mg, "inverted_elements", report.inverted_elements, "guard_steps",
-                 report.guard_steps, "feedback", report.feedback_rms, "correction", report.correction_rms, "correction_buzz",
+                 "external_assist", report.external_assist_mg, "external_assist_time", report.external_assist_time_s,
+                 "inverted_elements", report.inverted_elements, "guard_steps", report.guard_steps, "feedback", report.feedback_rms, "correction", report.correction_rms, "correction_buzz",
                  report.correction_buzz_rms, "style_range", report.style_range, "style_range_least", report.style_range_least, "real_time_factor", report.real_time_factor,
                  "apex_rise", report.apex_rise_length, "clip_apex_rise", report.clip_apex_rise_length);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "retarget/reference_glide.h"
 
@@ -14,14 +15,16 @@ constexpr double kNothingBelow = 1e299;  // [m]: as high is a patch where there 
 constexpr double kLeastRange = 1e-3;     // of L: a clip whose skin moves less within the body has no style to lose
 constexpr double kLeastShareOfPoints = 0.1;  // of those that move most: what the least ratio leaves below it
 
-/// Slope of the least-squares line through (x, y).
+constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();  // what a run does not tell
+
+/// Slope of the least-squares line through (x, y); untold where they are fewer than two places.
 double slope(const std::vector<double>& x, const std::vector<double>& y) {
-  if (x.size() < 2) return 0;
+  if (x.size() < 2) return kUntold;
   const double n = static_cast<double>(x.size());
   double mx = 0, my = 0, sxy = 0, sxx = 0;
   for (std::size_t i = 0; i < x.size(); ++i) mx += x[i] / n, my += y[i] / n;
   for (std::size_t i = 0; i < x.size(); ++i) sxy += (x[i] - mx) * (y[i] - my), sxx += (x[i] - mx) * (x[i] - mx);
-  return sxx > 0 ? sxy / sxx : 0;
+  return sxx > 0 ? sxy / sxx : kUntold;
 }
 
 /// Headings [rad] that go on beyond half a turn.
@@ -96,8 +99,8 @@ void ReplayMetrics::balance_momentum(const ControlStep& step) {
       spin - spin_ - step.impulses.gravity_moment - step.impulses.contact_moment - step.impulses.effect_moment;
   report_.momentum_residual_mg = std::max(report_.momentum_residual_mg, change.norm() / control_s_ / weight_);
   report_.angular_residual_mgl = std::max(report_.angular_residual_mgl, turned.norm() / control_s_ / (weight_ * length_));
-  const double assist = step.impulses.correction_nodes.colwise().norm().sum();
-  report_.external_assist_mg = std::max(report_.external_assist_mg, assist / control_s_ / weight_);
+  const double assist = step.impulses.correction_nodes.colwise().norm().sum() / control_s_ / weight_;
+  if (assist > report_.external_assist_mg) report_.external_assist_mg = assist, report_.external_assist_time_s = step.time_s;
   momentum_ = momentum;
   spin_ = spin;
 }
@@ -228,8 +231,9 @@ void ReplayMetrics::measure_drift(ReplayReport& report) const {
   if (input_.prepared.target.loop) {
     report.drift_per_cycle_length = slope(cycle_, drift_) / length_;
     report.heading_deg_per_cycle = slope(cycle_, unwound(heading_)) * 180 / M_PI;
-  } else if (!drift_.empty()) {
-    report.drift_per_cycle_length = drift_.back() / length_;
+  } else {
+    report.drift_per_cycle_length = drift_.empty() ? kUntold : drift_.back() / length_;
+    report.heading_deg_per_cycle = heading_.empty() ? kUntold : unwound(heading_).back() * 180 / M_PI;
   }
 }
 
@@ -240,6 +244,7 @@ void ReplayMetrics::measure_apex(ReplayReport& report) const {
 
 ReplayReport ReplayMetrics::figures() const {
   ReplayReport report = report_;
+  measure_drift(report);
   if (steps_ == 0) return report;
   report.duration_s = course_.time_s[steps_ - 1];
   report.cycles = report.duration_s / period_s_;
@@ -250,7 +255,6 @@ ReplayReport ReplayMetrics::figures() const {
   report.feedback_rms = std::sqrt(feedback_.value());
   report.correction_rms = std::sqrt(correction_.value());
   report.correction_buzz_rms = std::sqrt(buzz_.value());
-  measure_drift(report);
   measure_way(report);
   measure_apex(report);
   measure_style(report);

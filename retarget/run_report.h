@@ -47,11 +47,13 @@ struct ReplayReport {
   bool fell = false;
   double fall_time_s = 0;
   std::string fall_cause;
-  double shape_rms_length = 0, clip_shape_rms_length = 0, world_rms_length = 0, drift_per_cycle_length = 0;
-  double heading_deg_per_cycle = 0, travel_per_cycle_length = 0, clip_travel_per_cycle_length = 0;
+  double shape_rms_length = 0, clip_shape_rms_length = 0, world_rms_length = 0;
+  double drift_per_cycle_length = 0, heading_deg_per_cycle = 0;  // not a number of a loop seen for two cycles or fewer, which does not tell them
+  double travel_per_cycle_length = 0, clip_travel_per_cycle_length = 0;
   double slip_per_stance_length = 0, held_slip_per_stance_length = 0;  // of all that bears load; of what the target holds
   double sole_gap_length = 0, penetration_max_size = 0, volume_error_max = 0;
   double momentum_residual_mg = 0, angular_residual_mgl = 0, external_assist_mg = 0;
+  double external_assist_time_s = 0;  // at which it was most
   int inverted_elements = 0;  // the most in any control step
   int guard_steps = 0;
   double feedback_rms = 0;  // activations that are not the signals', of all constraints

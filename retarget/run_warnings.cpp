@@ -14,10 +14,11 @@ constexpr double kOverLimit = 1.5;       // of the limit
 constexpr double kSaturated = 0.05;      // share of the activations
 constexpr double kMiss = 3e-4;           // per L
 constexpr double kRootResidual = 0.01;   // [m g]
+constexpr double kFarFromClip = 0.1;     // of L: the eye no longer sees the same motion
 
 template <typename... Numbers>
 std::string sentence(const char* form, Numbers... numbers) {
-  char text[400];
+  char text[500];
   std::snprintf(text, sizeof text, form, numbers...);
   return text;
 }
@@ -45,8 +46,8 @@ std::string in_words(const Feedback& feedback) {
 }
 
 std::string way_in_words(const ReplayReport& report) {
-  return sentence("makes %.0f %% of the clip's way and drifts %.2g %% L a cycle",
-                  100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length, 100 * report.drift_per_cycle_length);
+  const std::string way = sentence("makes %.0f %% of the clip's way", 100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length);
+  return std::isnan(report.drift_per_cycle_length) ? way : way + sentence(" and drifts %.2g %% L a cycle", 100 * report.drift_per_cycle_length);
 }
 
 }  // namespace
@@ -57,8 +58,8 @@ std::vector<std::string> target_warnings(const PreparedTarget& prepared, const p
   Eigen::Index worst = 0;
   const Eigen::RowVectorXd missing = prepared.missing_wrench.colwise().norm();
   if (missing.size() > 0 && missing.maxCoeff(&worst) > kMissingWrench) {
-    warnings.push_back(sentence("contact cannot give all that the motion needs: %.2f mg are missing at frame %ld, ", missing[worst],
-                                static_cast<long>(worst)) +
+    warnings.push_back(sentence("contact cannot give all that the motion needs: %.2f mg are missing at %.2f s, ", missing[worst],
+                                static_cast<double>(worst) / prepared.target.rate_hz) +
                        patches_in_contact(prepared.contacts, static_cast<std::size_t>(worst)) +
                        "; slow the motion there or put a foot below it");
   }
@@ -101,6 +102,24 @@ std::vector<std::string> feedback_warnings(const Performances& performances, con
   if (performances.trials_lost == 0) return {taken};
   return {taken + sentence("; of %d bodies %.0f %% off the plan, shoved by %.1f m/s, it loses %d", static_cast<int>(kTrials.size()),
                            100 * kTrialVariation, kTrialShove, performances.trials_lost)};
+}
+
+bool is_assisted(const ReplayReport& run) { return run.external_assist_mg > kAssist; }
+
+std::vector<std::string> motion_warnings(const ReplayReport& run) {
+  std::vector<std::string> warnings;
+  if (is_assisted(run)) {
+    warnings.push_back(sentence("assist: the creature is not self-driven throughout: the solver's guard took over %d steps that would have gone astray, and "
+                                "turned the body in the air by what none of its own forces gave, as much as %.2g times its weight at %.2f s; "
+                                "convert again with --method euler, more --nodes or a calmer clip",
+                                run.guard_steps, run.external_assist_mg, run.external_assist_time_s));
+  }
+  if (!run.fell && run.clip_shape_rms_length > kFarFromClip) {
+    warnings.push_back(sentence("the skin is %.0f %% L from the clip's (RMS, without travel and turn): the creature moves otherwise than the clip; convert again "
+                                "with more --nodes, a higher --limit or --firmness",
+                                100 * run.clip_shape_rms_length));
+  }
+  return warnings;
 }
 
 std::vector<std::string> polish_warnings(const Polished& polished) {

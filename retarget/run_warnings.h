@@ -8,7 +8,7 @@
 
 namespace hydrostat::retarget {
 
-/// One sentence for each thing that an animator should know about a target: what it lacks (with frame and patch), and whether
+/// One sentence for each thing that an animator should know about a target: what it lacks (with time and patch), and whether
 /// its constraints fit the limit of |activation - 1|.
 std::vector<std::string> target_warnings(const PreparedTarget& prepared, const physics::Body& body, double limit,
                                          bool limit_is_automatic);
@@ -19,6 +19,14 @@ std::vector<std::string> inverse_warnings(const InverseReport& inverse);
 /// Which feedback took the place of what was wished (perform_steadily) and why, or that a creature loses its way on any; none where what
 /// was wished will do, nor of a fall, which is told elsewhere.
 std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished = {});
+
+/// m g from which an assist (external_assist_mg) is none of rounding.
+constexpr double kAssist = 1e-6;
+/// Whether something else than the creature's own forces and the world's had a hand in a run.
+bool is_assisted(const ReplayReport& run);
+
+/// What the figures of the main run say against it: that it was assisted, or that its skin is far from the clip's. A fall is told elsewhere.
+std::vector<std::string> motion_warnings(const ReplayReport& run);
 
 /// Of polished signals that were left out, for they cost bodies off the plan their balance.
 std::vector<std::string> polish_warnings(const Polished& polished);

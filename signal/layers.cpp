@@ -189,6 +189,20 @@ std::string broken_rule(const Layer& layer, Kind kind, int samples) {
   return std::visit([&](const auto& edit) { return broken_rule(edit, kind, samples); }, layer.edit);
 }
 
+std::string broken_rule(const std::vector<Layer>& layers, const Spectrum& solved, const std::vector<Label>& labels, double rest) {
+  const auto is_reckonable = [&](const std::vector<Layer>& some) {
+    const Spectrum result = apply(some, solved, labels, rest).spectrum;
+    return std::isfinite(result.cosine.squaredNorm() + result.sine.squaredNorm() + result.cubic.squaredNorm());
+  };
+  if (is_reckonable(layers)) return "";
+  std::vector<Layer> first;
+  for (const Layer& layer : layers) {
+    first.push_back(layer);
+    if (!is_reckonable(first)) return "layer '" + layer.name + "' makes the signals too large to be reckoned with";
+  }
+  return "";
+}
+
 std::vector<int> selected_channels(const Selection& selection, const std::vector<Label>& labels) {
   std::vector<int> channels;
   for (std::size_t c = 0; c < labels.size(); ++c) {

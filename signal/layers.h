@@ -68,6 +68,10 @@ struct Layer {
 /// Says which value of the layer breaks which rule for signals of this kind and number of samples; empty when all is well.
 std::string broken_rule(const Layer& layer, Kind kind, int samples);
 
+/// The same of layers that break no rule alone, over these signals: names the first that takes them beyond what can be reckoned with (a
+/// coefficient whose square is no finite number).
+std::string broken_rule(const std::vector<Layer>& layers, const Spectrum& solved, const std::vector<Label>& labels, double rest);
+
 /// Indices of the channels that the patterns name, ascending.
 std::vector<int> selected_channels(const Selection& selection, const std::vector<Label>& labels);
 

@@ -2,6 +2,7 @@
 import uPlot from 'uplot';
 
 import { colour_of, doubles, floats, kRoles } from './data.js';
+import { tick_texts } from './tables.js';
 
 const kHeight = 168;
 const kAxisWidth = 58; // shared by the timeline, so that its time axis stands under the curves'
@@ -44,7 +45,10 @@ class TimeChart {
       legend: { show: false },
       cursor: { sync: { key: 'time' }, drag: { x: true, y: false }, points: { size: 6 } },
       scales: { x: { time: false, range: (u, least, most) => (least === null ? [0, end] : [least, most]) } },
-      axes: [{ ...axis, size: 26, values: (u, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: kAxisWidth }],
+      axes: [
+        { ...axis, size: 26, values: (u, ticks) => ticks.map((tick) => `${tick} s`) },
+        { ...axis, size: kAxisWidth, values: (u, ticks, rank, space, step) => tick_texts(ticks, step) },
+      ],
       series: [{}, ...chart.curves.map((curve, index) => ({
         label: curve.name,
         stroke: colour_of(curve.role, curve.rank ?? index),

@@ -38,6 +38,13 @@ function number(value) {
   return size >= 1000 ? Math.round(value).toLocaleString('en') : String(Number(value.toPrecision(3)));
 }
 
+/** Ticks of an axis with as many digits behind the point as tell one step from the next. */
+export function tick_texts(ticks, step) {
+  let digits = 0;
+  while (digits < 12 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6 * step * 10 ** digits) ++digits;
+  return ticks.map((tick) => tick.toLocaleString('en', { minimumFractionDigits: digits, maximumFractionDigits: digits }));
+}
+
 function unit_of(key) {
   if (kShares.has(key)) return ['', 100, '%'];
   return kUnits.find(([ending]) => `_${key}`.endsWith(ending)) ?? ['', 1, ''];

@@ -22,7 +22,7 @@ for (const row of rows) {
   grouped.get(key)[row.push === "none" ? "seeds" : "pushes"].push(row);
 }
 const summary = [...grouped.values()].map(({ clip, variant, seeds, pushes }) => {
-  const of = (name) => median(seeds.filter((row) => row.outcome === "up").map((row) => Math.abs(row[name])));
+  const of = (name) => median(seeds.filter((row) => row.outcome === "up").map((row) => Math.abs(row[name])).filter((value) => !Number.isNaN(value)));
   return {
     clip,
     variant,

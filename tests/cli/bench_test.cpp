@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "cli/bench.h"
 #include "io/scaling_page.h"
+#include "retarget/effect_bench.h"
 #include "tests/cli/run_program.h"
 
 namespace hydrostat::cli::bench_test {
@@ -34,6 +36,13 @@ TEST(Bench, ScalingTellsTheCostOfEverySizeInTableAndPage) {
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
   EXPECT_NE(io::read_file(directory.path / "out" / "scaling.html").find("<svg"), std::string::npos);
   EXPECT_TRUE(fs::exists(directory.path / "out" / "scene.toml"));  // what '-' stands for
+}
+
+TEST(Bench, EffectsThatDivergeStillFillOneLine) {
+  EXPECT_EQ(effect_line({"gravity", 1.5, 0.02, true, 0, 12.25, 0.4}),
+            "gravity           1.500 ms a second, moves it by    2.000 % L; all others:    12.250 ms,   40.000 % L from all");
+  const std::string huge = effect_line({"self_contact", 1e300, 1e250, false, 0, HUGE_VAL, std::nan("")});
+  EXPECT_NE(huge.find("   1e+300 ms a second, moves it by   1e+252 % L; all others:       inf ms,      nan % L from all"), std::string::npos) << huge;
 }
 
 TEST(Bench, SpeedTellsWhatEveryStageOfAConversionCosts) {

@@ -68,6 +68,42 @@ TEST(CommandLine, TellsUsageErrorsOnOneLineWithExitCode2) {
          "hydrostat batch: option --jobs: Value 0 not in range 1 to 256. 'hydrostat batch --help' tells what it takes.");
 }
 
+TEST(CommandLine, TellsUnexpectedArgumentsInTheirOrder) {
+  const TemporaryDirectory directory;
+  EXPECT_EQ(hydrostat_in(directory.path, "batch M --threads 1").err,
+            "hydrostat batch: command line: The following arguments were not expected: --threads 1. 'hydrostat batch --help' tells what it takes.\n");
+  EXPECT_EQ(hydrostat_in(directory.path, "bench effects M -o out --thread=1 two three").err,
+            "hydrostat bench: command line: The following arguments were not expected: --thread=1 two three. 'hydrostat bench --help' tells what it takes.\n");
+}
+
+/// Before anything is read or made, hence with clips and creatures that are none.
+TEST(CommandLine, APlaceIsNeitherEmptyNorAnOption) {
+  const TemporaryDirectory directory;
+  for (const std::string command :
+       {"convert clip.glb -o", "convert clip.glb -o out --scene", "replay creature -o", "replay creature --scene", "replay creature --trace", "simulate s.toml -o",
+        "simulate s.toml -o out --trace", "compare a b -o", "batch m.toml -o", "bench effects s.toml -o", "bench accuracy s.toml -o", "bench scaling s.toml -o",
+        "bench import clip.glb -o", "bench speed -o"}) {
+    SCOPED_TRACE(command);
+    const std::string option = command.ends_with(" -o") ? "--out" : command.substr(command.rfind(' ') + 1);
+    const Outcome empty = hydrostat_in(directory.path, command + " ''"), swallowed = hydrostat_in(directory.path, command + " --quiet");
+    EXPECT_EQ(empty.exit_code, 2);
+    EXPECT_NE(empty.err.find("option " + option + ": is empty where a path belongs. "), std::string::npos) << empty.err;
+    EXPECT_EQ(swallowed.exit_code, 2);
+    EXPECT_NE(swallowed.err.find("option " + option + ": '--quiet' is an option where a path belongs (a file of that name is ./--quiet). "), std::string::npos)
+        << swallowed.err;
+  }
+  EXPECT_EQ(directory.count(), 0U);
+}
+
+TEST(CommandLine, AnErrorThatIsNoneIsRefusedBeforeTheClipIsRead) {
+  const TemporaryDirectory directory;
+  for (const char* error : {"60%", "abc", "0", "0.000001%"}) {
+    const Outcome outcome = hydrostat_in(directory.path, std::string("convert none.glb -o out --quiet --max-error ") + error);
+    EXPECT_EQ(outcome.exit_code, 2) << error;
+    EXPECT_EQ(outcome.err.find("hydrostat convert: option --max-error: '" + std::string(error) + "' is no share of L"), 0U) << outcome.err;
+  }
+}
+
 TEST(CommandLine, ListsItsSubcommandsAndItsVersion) {
   const TemporaryDirectory directory;
   const Outcome help = hydrostat_in(directory.path, "--help");

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <set>
 
@@ -75,10 +76,37 @@ TEST(Outcome, OfADivergenceIsNoFallAndWantsNoHigherLimit) {
   };
   run.report.fell = true;
   run.report.fall_cause = "it was so";
-  EXPECT_EQ(told(""), "creature: replay: the creature fell: it was so. failed.glb shows it; try a higher --limit, more --nodes or a calmer clip.\n");
+  EXPECT_EQ(told(""), "creature: replay: the creature fell: it was so. failed.glb shows it.\n");
+  EXPECT_EQ(change_of_conversion(run), "more --nodes or a calmer clip");
   run.termination = physics::Termination::kDiverged;
-  EXPECT_EQ(told(""), "creature: replay: it was so. failed.glb shows it; try --method euler or more --nodes.\n");
+  EXPECT_EQ(change_of_conversion(run), "--method euler or more --nodes");
   EXPECT_EQ(told("take another"), "creature: replay: it was so. failed.glb shows it; take another.\n");
+}
+
+TEST(Outcome, AHigherLimitIsAdvisedWhereTheFallFoundConstraintsAtTheirs) {
+  retarget::Replay run;
+  run.report.fell = true;
+  run.report.fall_time_s = 2;
+  run.course.time_s = Eigen::VectorXd::LinSpaced(23, 0, 2.2);
+  run.course.saturated = Eigen::VectorXd::Zero(23);
+  run.course.saturated.head(10).setConstant(0.5);  // long before
+  EXPECT_EQ(change_of_conversion(run), "more --nodes or a calmer clip");
+  run.course.saturated[19] = 0.12;
+  EXPECT_EQ(change_of_conversion(run), "a higher --limit (12 % of all constraints were at the present one), more --nodes or a calmer clip");
+}
+
+TEST(Outcome, TellsADriftThatIsToldAndAnAssist) {
+  retarget::Replay run;
+  const auto told = [&run] {
+    testing::internal::CaptureStdout();
+    EXPECT_EQ(tell_run(run, "creature", "failed.glb"), kDone);
+    return testing::internal::GetCapturedStdout();
+  };
+  EXPECT_NE(told().find("(clip 0.000), drift 0.00 % L a cycle; 0.00x real time"), std::string::npos) << told();
+  run.report.drift_per_cycle_length = std::nan("");
+  EXPECT_NE(told().find("(clip 0.000); 0.00x real time"), std::string::npos) << told();
+  run.report.external_assist_mg = 6.8;
+  EXPECT_NE(told().find("(clip 0.000); assisted from outside by up to 6.8 mg; 0.00x real time"), std::string::npos) << told();
 }
 
 TEST(LevelTrial, TellsWhatIsKnownAndHowToMend) {
@@ -86,7 +114,7 @@ TEST(LevelTrial, TellsWhatIsKnownAndHowToMend) {
   EXPECT_EQ(way_up(found, true), "the cheapest level on which it keeps its way, of 48 nodes, takes 2 ms a frame: give --budget 2.2ms");
   EXPECT_EQ(way_up(found, false), "the cheapest level on which it keeps its way, of 48 nodes, takes 2 ms a frame: give --lod 50");
   EXPECT_EQ(way_up({kLevels[2], {}}, false), "the cheapest level on which it keeps its way, of 100 nodes, takes 4 ms a frame: give --lod 100");
-  EXPECT_EQ(way_up(lost, true), "it falls or gets nowhere on levels of 12, 24 and 48 nodes, too: try a higher --limit, more --nodes or a calmer clip");
+  EXPECT_EQ(way_up(lost, true), "it falls or gets nowhere on levels of 12, 24 and 48 nodes, too: convert again with more --nodes or a calmer clip");
   EXPECT_EQ(way_up(unknown, true), "");
   const auto refused = [](const LevelTrial& trial) {
     const UsageError error = no_level_within("hydrostat replay", 0.01, kLevels, trial);

@@ -76,6 +76,14 @@ TEST_F(SignalsCommand, ListGroupsChannelsByBone) {
   EXPECT_EQ(run("list --bone 'FL_*' --json").output.find("spine"), std::string::npos);
 }
 
+TEST_F(SignalsCommand, AnEditThatLeavesTheNumbersIsRefusedAndTheFileStays) {
+  ASSERT_EQ(run("gain --factor 1e80").exit_code, 0);
+  const std::string before = text_of(file());
+  expect_said(run("gain --factor 1e308"), 2, {"option --factor or --range: layer 'gain 2' makes the signals too large to be reckoned with", "Give less"});
+  EXPECT_EQ(text_of(file()), before);
+  EXPECT_EQ(run("list").output.find("nan"), std::string::npos);
+}
+
 TEST_F(SignalsCommand, PlotDrawsThem) {
   expect_said(run("plot --bone spine"), 0, {"signals.svg: 2 channels"});
   const std::string drawing = text_of(directory_ / "signals.svg");

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <random>
 
@@ -70,6 +71,15 @@ TEST_F(ComparisonOf, APageGivesItsReplayBack) {
   EXPECT_EQ(read.embedding.nodes, performer_.embedding.nodes);
   EXPECT_EQ(read.embedding.weights, performer_.embedding.weights);
   EXPECT_EQ(read.triangles, performer_.skin.triangles);
+}
+
+TEST_F(ComparisonOf, WhatOneRunCannotTellIsNothingThere) {
+  report_.closed_loop->drift_per_cycle_length = 0.01;
+  const std::string told = page("told");
+  report_.closed_loop->drift_per_cycle_length = std::nan("");
+  const Comparison comparison = compare_runs({told, page("untold")});
+  EXPECT_TRUE(std::holds_alternative<double>(figure(comparison.runs[0], "replay.drift_per_cycle_length")));
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(figure(comparison.runs[1], "replay.drift_per_cycle_length")));
 }
 
 TEST_F(ComparisonOf, TheDistanceIsThatOfTheSkins) {

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <memory>
 
+#include "io/creature_record.h"
 #include "io/write_file.h"
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
@@ -164,6 +165,27 @@ TEST(CreatureWriter, RefusesADirectoryThatIsNoCreature) {
             home.string() + "||holds no creature (no creature.toml)|Make one with 'hydrostat convert CLIP -o DIR'.");
   EXPECT_EQ(read_file(home / "thesis.txt"), "years of work");
   EXPECT_EQ(directory.count(), 1U);
+}
+
+TEST(CreatureWriter, RefusesASimulationWhereACreatureBelongsAndTheOtherWayRound) {
+  const TemporaryDirectory directory;
+  using Kind = CreatureWriter::Kind;
+  const auto make = [&](const fs::path& place, Kind kind) {
+    CreatureRecord record;
+    if (kind == Kind::simulation) record.settings = {{"kind", std::string("scene")}};
+    CreatureWriter writer(place, Start::afresh, kind);
+    writer.write("creature.toml", to_toml(record));
+    writer.commit();
+  };
+  const fs::path creature = directory.path / "trot", simulation = directory.path / "bar";
+  make(creature, Kind::creature);
+  make(simulation, Kind::simulation);
+  EXPECT_EQ(refusal([&] { make(creature, Kind::simulation); }),
+            creature.string() + "||holds a creature, which a simulation would replace|Give another directory, or remove this one first.");
+  EXPECT_EQ(refusal([&] { make(simulation, Kind::creature); }),
+            simulation.string() + "||holds a scene's simulation, which a creature would replace|Give another directory, or remove this one first.");
+  make(creature, Kind::creature);
+  make(simulation, Kind::simulation);
 }
 
 TEST(CreatureWriter, RefusesAFile) {

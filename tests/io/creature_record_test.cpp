@@ -104,6 +104,31 @@ TEST(CreatureRecord, NamesTheLineOfWhatIsWrong) {
   EXPECT_NE(odd.find("setting 'odd' is neither number, text nor true or false|"), std::string::npos) << odd;
 }
 
+TEST(CreatureRecord, SettingsThatACreatureCannotGoByAreRefused) {
+  using Setting = CreatureRecord::Setting;
+  const auto told = [](const std::string& name, const Setting& value) {
+    CreatureRecord record = example();
+    record.settings = {{name, value}};
+    return refusal([&] { check_settings(record, "trot/creature.toml"); });
+  };
+  EXPECT_EQ(told("method", "foo"),
+            "trot/creature.toml|setting 'method'|is 'foo', where one of explicit, implicit, euler, xpbd, spring belongs|Mend the value, or make the creature "
+            "again with 'hydrostat convert'.");
+  EXPECT_NE(told("corrector_effort", "abc").find("|is 'abc', where a number above 0 and at most 1e6 belongs|"), std::string::npos);
+  for (const char* name : {"corrector_effort", "corrector_horizon", "corrector_root_weight"}) {
+    EXPECT_NE(told(name, 0.0).find(std::string("|setting '") + name + "'|is 0.0, where a number above 0"), std::string::npos);
+  }
+  EXPECT_NE(told("corrector_regulator", -1.0).find("is -1.0, where a number from 0"), std::string::npos);
+  EXPECT_NE(told("step_s", std::numeric_limits<double>::quiet_NaN()).find("is nan, where"), std::string::npos);
+  EXPECT_NE(told("seed", 1.5).find("is 1.5, where a whole number"), std::string::npos);
+  EXPECT_NE(told("wobble", std::int64_t{1}).find("is 1, where one of auto, on, off"), std::string::npos);
+  EXPECT_NE(told("calibrated", "yes").find("is 'yes', where true or false"), std::string::npos);
+
+  CreatureRecord sound = example();
+  sound.settings = {{"method", std::string("xpbd")}, {"corrector_effort", std::int64_t{4}}, {"step_s", 1.0 / 120}, {"seed", std::int64_t{0}}, {"limit", std::string("auto")}};
+  check_settings(sound, "trot/creature.toml");
+}
+
 TEST(CreatureRecord, RefusesADirectoryWithoutOne) {
   const TemporaryDirectory directory;
   const std::string told = refusal([&] { read_creature_record(directory.path); });

@@ -281,6 +281,10 @@ TEST(ReportPage, HoldsTheMorphTargetsAndPlaysThemTurnedWithTheBody) {
   EXPECT_EQ(std::system("node '" HYDROSTAT_TESTS "/io/check_morphs.mjs'"), 0);
 }
 
+TEST(ReportPage, TicksOfAnAxisAreToldApart) {
+  EXPECT_EQ(std::system("node '" HYDROSTAT_TESTS "/io/check_ticks.mjs'"), 0);
+}
+
 TEST(ReportPage, RefusesAPlaceThatCannotBeWritten) {
   EXPECT_THROW(write_report_page("/proc/absent/report.html", WobblingBar().page()), Error);
 }

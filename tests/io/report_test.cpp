@@ -112,6 +112,16 @@ TEST(ReportJson, TurnsWhatIsNoNumberIntoNullAndWarns) {
   EXPECT_NE(json["warnings"][2].get<std::string>().find("replay.open_loop.shape_rms_length"), std::string::npos);
 }
 
+TEST(ReportJson, DriftAndHeadingThatCannotBeToldAreNullWithoutAWarning) {
+  retarget::RunReport report = full_report();
+  report.closed_loop->drift_per_cycle_length = report.closed_loop->heading_deg_per_cycle = std::numeric_limits<double>::quiet_NaN();
+  const Json json = Json::parse(report_json(report)), run = json["replay"]["closed_loop"];
+  EXPECT_TRUE(run.at("drift_per_cycle_length").is_null());
+  EXPECT_TRUE(run.at("heading_deg_per_cycle").is_null());
+  EXPECT_EQ(json["replay"]["naive"]["drift_per_cycle_length"], 0);
+  EXPECT_EQ(json["warnings"].size(), 0U);
+}
+
 TEST(ReportJson, AFallHasTimeAndCauseAndNoFallHasNeither) {
   retarget::RunReport report = full_report();
   report.naive->fell = true;

@@ -161,9 +161,35 @@ TEST(ReplayMetrics, DriftAndHeadingAreSlopesPerCycle) {
   EXPECT_NEAR(run.figures().heading_deg_per_cycle, 1.3 * 180 / M_PI, 1e-6);
 }
 
+/// A cycle lasts twelve steps.
+TEST(ReplayMetrics, ALoopSeenForTwoCyclesTellsNeitherDriftNorHeading) {
+  Measured run;
+  const Eigen::Matrix3Xd rest = run.state.x;
+  for (int k = 1; k <= 26; ++k) {
+    run.state.x = rest.colwise() + Eigen::Vector3d(0.003, 0, 0.004) * k;
+    run.step();
+    const bool is_told = k > 24;
+    EXPECT_EQ(std::isfinite(run.figures().drift_per_cycle_length), is_told) << k;
+    EXPECT_EQ(std::isfinite(run.figures().heading_deg_per_cycle), is_told) << k;
+  }
+  EXPECT_NEAR(run.figures().drift_per_cycle_length, 12 * 0.005 / BoxCreature::kLength, 1e-9);
+}
+
+TEST(ReplayMetrics, AnAssistIsToldWithItsTime) {
+  Measured run;
+  for (int k = 1; k <= 6; ++k) {
+    run.impulses.correction_nodes.setZero();
+    if (k == 3 || k == 5) run.impulses.correction_nodes.col(0).x() = (k == 3 ? 2 : 1) * run.creature.mass() * 9.81 * kStep;
+    run.step();
+  }
+  EXPECT_NEAR(run.figures().external_assist_mg, 2, 1e-9);
+  EXPECT_NEAR(run.figures().external_assist_time_s, 3 * kStep, 1e-12);
+}
+
 TEST(ReplayMetrics, OfNoStepsAreNone) {
   const Measured run;
   EXPECT_EQ(run.figures().duration_s, 0);
+  EXPECT_TRUE(std::isnan(run.figures().drift_per_cycle_length));
   EXPECT_EQ(run.course().time_s.size(), 0);
   EXPECT_EQ(run.course().com.cols(), 0);
 }

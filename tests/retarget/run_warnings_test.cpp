@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/retarget/box_performer.h"
 
 namespace hydrostat::retarget::run_warnings_test {
@@ -12,18 +14,18 @@ TEST(TargetWarnings, SayNothingOfATargetThatLacksNothing) {
   EXPECT_TRUE(target_warnings(performer.prepared, performer.scene.body, 0.1, true).empty());
 }
 
-TEST(TargetWarnings, NameFrameAndPatchesOfTheMissingWrench) {
+TEST(TargetWarnings, NameTimeAndPatchesOfTheMissingWrench) {
   Performer performer = make_box_performer();
   performer.prepared.missing_wrench(1, 7) = 0.2;
   performer.prepared.contacts.state[0][7] = ContactState::kOff;
   const auto warnings = target_warnings(performer.prepared, performer.scene.body, 0.1, true);
   ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_EQ(warnings[0].find("contact cannot give all that the motion needs: 0.20 mg are missing at frame 7, standing on 'back_left', "
+  EXPECT_EQ(warnings[0].find("contact cannot give all that the motion needs: 0.20 mg are missing at 0.12 s, standing on 'back_left', "
                              "'front_right', 'front_left'"),
             0U)
       << warnings[0];
   for (auto& states : performer.prepared.contacts.state) states[7] = ContactState::kOff;
-  EXPECT_NE(target_warnings(performer.prepared, performer.scene.body, 0.1, true)[0].find("frame 7, in flight"), std::string::npos);
+  EXPECT_NE(target_warnings(performer.prepared, performer.scene.body, 0.1, true)[0].find("0.12 s, in flight"), std::string::npos);
 }
 
 TEST(TargetWarnings, TellOfAClipThatNeedsFarMoreThanTheLimit) {
@@ -88,6 +90,34 @@ TEST(FeedbackWarnings, TellWhichGainWasTakenAndWhy) {
                           "shoved by 0.1 m/s, it loses 2");
   EXPECT_EQ(told(performances_of(0.4, {}, Lapse::kLostWay, Lapse::kLostWay)),
             "feedback: the creature makes 80 % of the clip's way and drifts 2.5 % L a cycle, and strays half as far on no other gain");
+}
+
+/// Early falls and short replays tell none.
+TEST(FeedbackWarnings, LeaveADriftOutThatCannotBeTold) {
+  Performances lost = performances_of(0.4, {}, Lapse::kLostWay, Lapse::kLostWay);
+  lost.closed_loop->report.drift_per_cycle_length = std::nan("");
+  EXPECT_EQ(feedback_warnings(lost).front(), "feedback: the creature makes 80 % of the clip's way, and strays half as far on no other gain");
+}
+
+TEST(MotionWarnings, TellOfWhatCarriedTheCreatureAndOfAStrangeShape) {
+  ReplayReport run;
+  run.guard_steps = 469;
+  run.clip_shape_rms_length = 0.09;
+  EXPECT_TRUE(motion_warnings(run).empty());
+  run.external_assist_mg = 1e-9;  // of rounding
+  EXPECT_TRUE(motion_warnings(run).empty());
+  run.external_assist_mg = 6.8;
+  run.external_assist_time_s = 0.64;
+  ASSERT_EQ(motion_warnings(run).size(), 1U);
+  for (const char* word : {"assist: the creature is not self-driven throughout", "469 steps", "6.8 times its weight at 0.64 s", "--method euler"}) {
+    EXPECT_NE(motion_warnings(run)[0].find(word), std::string::npos) << motion_warnings(run)[0];
+  }
+  run.external_assist_mg = 0;
+  run.clip_shape_rms_length = 0.123;
+  ASSERT_EQ(motion_warnings(run).size(), 1U);
+  EXPECT_EQ(motion_warnings(run)[0].find("the skin is 12 % L from the clip's"), 0U) << motion_warnings(run)[0];
+  run.fell = true;
+  EXPECT_TRUE(motion_warnings(run).empty());
 }
 
 }  // namespace

@@ -34,6 +34,17 @@ TEST(SelectedChannels, MatchByNameAndByGroup) {
   EXPECT_TRUE(selected_channels({.group = "tail"}, kLabels).empty());
 }
 
+TEST(BrokenRule, OfLayersTogetherNamesTheFirstThatIsTooMuch) {
+  for (const Kind kind : kKinds) {
+    const Spectrum solved = analyse(kind, random_samples(1, 30, 3), 8);
+    const auto gain = [](const std::string& name, double factor) { return Layer{name, {}, Gain{factor}}; };
+    EXPECT_EQ(broken_rule({gain("one", 1e80)}, solved, kLabels, 1), "");
+    EXPECT_EQ(broken_rule({gain("one", 1e80), gain("two", 1e80), gain("three", 2)}, solved, kLabels, 1),
+              "layer 'two' makes the signals too large to be reckoned with");
+    EXPECT_EQ(broken_rule({gain("one", 1e308)}, solved, kLabels, 1), "layer 'one' makes the signals too large to be reckoned with");
+  }
+}
+
 TEST(Apply, WithoutLayersChangesNothing) {
   for (const Kind kind : kKinds) {
     const Spectrum solved = analyse(kind, random_samples(1, 30, 3), 8);

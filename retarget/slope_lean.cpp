@@ -9,8 +9,8 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kBase = 4;       // k: how much of the lean a long base saves
-constexpr double kOnLegs = 0.2;   // floor
+constexpr double kBase = 0.2;     // of h^2: a base of these second moments saves half of the lean
+constexpr double kOnLegs = 0.3;   // floor
 constexpr double kDragged = 0;    // the same of what drags itself
 
 /// x and z of a vector from the target's heading at `yaw` to that of its first frame, or back.
@@ -57,8 +57,8 @@ SlopeLean::SlopeLean(const PreparedTarget& plan, const physics::Scene& model)
   if (!model.has_ground || !is_tilted || !(stands || is_dragged(plan.contacts))) return;
   slope_ << gravity.x() / gravity.y(), gravity.z() / gravity.y();
   const double floor = stands ? kOnLegs : kDragged;
-  const Eigen::Matrix2d one = Eigen::Matrix2d::Identity();
-  share_ = floor * one + (1 - floor) * (one + kBase * base_of(plan, model)).inverse();
+  const Eigen::Matrix2d one = Eigen::Matrix2d::Identity(), base = base_of(plan, model) / kBase;
+  share_ = floor * one + (1 - floor) * (one + base * base).inverse();
 }
 
 Eigen::Vector3d SlopeLean::at(double yaw) const {

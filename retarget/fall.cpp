@@ -44,7 +44,8 @@ std::string fall_cause(const ReplayInput& input, const physics::State& state, co
   }
   char text[300];
   std::snprintf(text, sizeof text,
-                "at %.2f s limb '%s' is %.3f m from its target, %.0f %% of its constraints at the limit of %.2f", time_s, worst.c_str(), largest,
+                "at %.2f s (frame %ld) limb '%s' is %.3f m from its target, %.0f %% of its constraints at the limit of %.2f",
+                time_s, frame_at(input.prepared.target, time_s), worst.c_str(), largest,
                 100.0 * at_limit[worst].first / std::max(1, at_limit[worst].second), input.limit);
   return text;
 }

@@ -58,8 +58,8 @@ std::vector<std::string> target_warnings(const PreparedTarget& prepared, const p
   Eigen::Index worst = 0;
   const Eigen::RowVectorXd missing = prepared.missing_wrench.colwise().norm();
   if (missing.size() > 0 && missing.maxCoeff(&worst) > kMissingWrench) {
-    warnings.push_back(sentence("contact cannot give all that the motion needs: %.2f mg are missing at %.2f s, ", missing[worst],
-                                static_cast<double>(worst) / prepared.target.rate_hz) +
+    warnings.push_back(sentence("contact cannot give all that the motion needs: %.2f mg are missing at %.2f s (frame %ld), ", missing[worst],
+                                static_cast<double>(worst) / prepared.target.rate_hz, static_cast<long>(worst)) +
                        patches_in_contact(prepared.contacts, static_cast<std::size_t>(worst)) +
                        "; slow the motion there or put a foot below it");
   }

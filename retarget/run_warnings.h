@@ -8,7 +8,7 @@
 
 namespace hydrostat::retarget {
 
-/// One sentence for each thing that an animator should know about a target: what it lacks (with time and patch), and whether
+/// One sentence for each thing that an animator should know about a target: what it lacks (with time, frame and patch), and whether
 /// its constraints fit the limit of |activation - 1|.
 std::vector<std::string> target_warnings(const PreparedTarget& prepared, const physics::Body& body, double limit,
                                          bool limit_is_automatic);

@@ -20,12 +20,12 @@ TEST(TargetWarnings, NameTimeAndPatchesOfTheMissingWrench) {
   performer.prepared.contacts.state[0][7] = ContactState::kOff;
   const auto warnings = target_warnings(performer.prepared, performer.scene.body, 0.1, true);
   ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_EQ(warnings[0].find("contact cannot give all that the motion needs: 0.20 mg are missing at 0.12 s, standing on 'back_left', "
+  EXPECT_EQ(warnings[0].find("contact cannot give all that the motion needs: 0.20 mg are missing at 0.12 s (frame 7), standing on 'back_left', "
                              "'front_right', 'front_left'"),
             0U)
       << warnings[0];
   for (auto& states : performer.prepared.contacts.state) states[7] = ContactState::kOff;
-  EXPECT_NE(target_warnings(performer.prepared, performer.scene.body, 0.1, true)[0].find("0.12 s, in flight"), std::string::npos);
+  EXPECT_NE(target_warnings(performer.prepared, performer.scene.body, 0.1, true)[0].find("0.12 s (frame 7), in flight"), std::string::npos);
 }
 
 TEST(TargetWarnings, TellOfAClipThatNeedsFarMoreThanTheLimit) {

@@ -6,6 +6,8 @@
 #include <map>
 #include <utility>
 
+#include "physics/face_key.h"
+
 namespace hydrostat::physics {
 namespace {
 
@@ -65,15 +67,11 @@ BodyOf<Dim> make_body(const PointsOf<Dim>& rest, const Eigen::Matrix<int, Dim + 
 
 template <int Dim>
 std::vector<SurfaceFace> surface_faces(const BodyOf<Dim>& body) {
-  std::map<std::array<int, Dim>, SurfaceFace> face_of;  // by its nodes in order; tet -1: two tets share it
+  std::map<std::array<int, Dim>, SurfaceFace> face_of;  // by key_of_face; tet -1: two tets share it
   for (int t = 0; t < body.tet_count(); ++t) {
     for (int opposite = 0; opposite <= Dim; ++opposite) {
-      std::array<int, Dim> key;
-      for (int k = 0, n = 0; k <= Dim; ++k) {
-        if (k != opposite) key[static_cast<std::size_t>(n++)] = body.tets(k, t);
-      }
-      std::sort(key.begin(), key.end());
-      const auto [entry, is_new] = face_of.try_emplace(key, SurfaceFace{t, opposite});
+      const SurfaceFace face{t, opposite};
+      const auto [entry, is_new] = face_of.try_emplace(key_of_face(body, face), face);
       if (!is_new) entry->second.tet = -1;
     }
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "physics/face_key.h"
 #include "physics/seam.h"
 
 namespace hydrostat::physics {
@@ -27,18 +28,14 @@ VectorOf<Dim> area_of_face(const PointsOf<Dim>& x, const Eigen::Matrix<int, Dim,
 template <int Dim>
 std::vector<std::pair<SurfaceFace, double>> uneven_faces(const BodyOf<Dim>& body) {
   constexpr double kLeast = 1e-9;  // rounding of shares that are alike
-  std::map<std::array<int, Dim>, SurfaceFace> first;  // by its nodes in order
+  std::map<std::array<int, Dim>, SurfaceFace> first;  // by key_of_face
   std::vector<std::pair<SurfaceFace, double>> faces;
   for (int t = 0; t < static_cast<int>(body.displaced_share.size()); ++t) {
     for (int opposite = 0; opposite <= Dim; ++opposite) {
-      std::array<int, Dim> key;
-      for (int k = 0, n = 0; k <= Dim; ++k) {
-        if (k != opposite) key[static_cast<std::size_t>(n++)] = body.tets(k, t);
-      }
-      std::sort(key.begin(), key.end());
-      const auto [entry, is_new] = first.try_emplace(key, SurfaceFace{t, opposite});
+      const SurfaceFace here{t, opposite};
+      const auto [entry, is_new] = first.try_emplace(key_of_face(body, here), here);
       if (is_new) continue;
-      const SurfaceFace here{t, opposite}, there = entry->second;
+      const SurfaceFace there = entry->second;
       const double more = body.displaced_share[t] - body.displaced_share[there.tet];
       if (std::abs(more) > kLeast) faces.emplace_back(more > 0 ? here : there, std::abs(more));
     }

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
+#include "physics/face_key.h"
 #include "tests/physics/lattice_scene.h"
 
 namespace hydrostat::physics::body_test {
@@ -65,6 +68,25 @@ TYPED_TEST(MakeBody, ResistsEvenStretchAsASolidOfItsYoungsModulusAndPoissonsRati
   // Energy of a dilation: 9/2 K e^2 a volume with K = E / (3 (1 - 2 nu)), in plane stress 2 K e^2 with K = E / (2 (1 - nu)).
   const double expected = (Dim == 3 ? 3.0 : 1.5) * material.youngs_modulus * kStretch * kStretch * body.rest_volume.sum();
   EXPECT_NEAR(elastic_energy(body, (1 + kStretch) * body.rest, passive(body)) / expected, 1, 1e-9);
+}
+
+TYPED_TEST(WholeBody, HasOneKeyForBothSidesOfAFaceAndASurfaceOfWhatHasOneSide) {
+  constexpr int Dim = TypeParam::kDim;
+  const BodyOf<Dim> body = random_body<Dim>(3);
+  std::map<std::array<int, Dim>, int> sides;
+  for (int t = 0; t < body.tet_count(); ++t) {
+    for (int opposite = 0; opposite <= Dim; ++opposite) ++sides[key_of_face<Dim>(body, {t, opposite})];
+  }
+  std::size_t outer = 0;
+  for (const auto& [key, count] : sides) {
+    EXPECT_TRUE(std::is_sorted(key.begin(), key.end()));
+    EXPECT_LE(count, 2);
+    outer += count == 1;
+  }
+  const std::vector<SurfaceFace> surface = surface_faces(body);
+  EXPECT_EQ(surface.size(), outer);
+  EXPECT_LT(outer, sides.size());
+  for (const SurfaceFace& face : surface) EXPECT_EQ(sides[key_of_face(body, face)], 1);
 }
 
 TYPED_TEST(WholeBody, HasTheJacobiansOfAnAffineMap) {

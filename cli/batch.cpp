@@ -90,6 +90,12 @@ std::string state_of(int exit_code) {
   }
 }
 
+/// To follow how a job ended.
+std::string counted_warnings(std::size_t count) {
+  if (count == 0) return "";
+  return " (" + std::to_string(count) + (count == 1 ? " warning)" : " warnings)");
+}
+
 /// Starts 'PROGRAM convert CLIP -o OUT OPTIONS' in the manifest's directory, its output in the job's log. Throws Error.
 pid_t start(const BatchJob& job, const std::string& program, const fs::path& directory) {
   const fs::path log = log_of(job);
@@ -146,8 +152,9 @@ class Batch {
     save();
     const std::vector<BatchResult> all = finished();
     const auto failed = std::count_if(all.begin(), all.end(), [](const BatchResult& r) { return r.exit_code != 0; });
-    progress_.end(std::to_string(all.size()) + " jobs, " + std::to_string(failed) + " failed, see " +
-                  results_file(".csv").string());
+    const auto warned = std::count_if(all.begin(), all.end(), [](const BatchResult& r) { return !r.warnings.empty(); });
+    progress_.end(std::to_string(all.size()) + " jobs, " + std::to_string(failed) + " failed, " +
+                  (warned > 0 ? std::to_string(warned) + " with warnings, " : "") + "see " + results_file(".csv").string());
     return all;
   }
 
@@ -202,12 +209,14 @@ class Batch {
                        message,
                        settings_[index],
                        "",
+                       {},
                        {}};
     if (exit_code == kDone || exit_code == kShortOfTarget) {  // otherwise what stands there is an older creature
       result.report_sha256 = report_sha256(job);
       result.figures = io::read_batch_figures(job.out);
+      result.warnings = io::read_batch_warnings(job.out);
     }
-    progress_.note(job.name + ": " + result.state + (message.empty() ? "" : ": " + message));
+    progress_.note(job.name + ": " + result.state + (message.empty() ? "" : ": " + message) + counted_warnings(result.warnings.size()));
     results_[index] = std::move(result);
     progress_.reach(static_cast<double>(finished().size()) / static_cast<double>(jobs_.size()));
     save();

@@ -223,35 +223,56 @@ void filter(const SignalsOptions& options, bool is_low_pass) {
   append(options, set, layer, "--low-pass, --band or --range");
 }
 
-void list_layers(const SignalsOptions& options) {
-  const SignalSet set = io::read_signals(signals_path(options));
-  if (options.json) {
-    std::cout << io::layers_text(set);
-    return;
-  }
-  const retarget::EditedActivations edited = retarget::edited_activations(set);
-  for (std::size_t l = 0; l < set.layers.size(); ++l) {
-    std::cout << l + 1 << " " << description(set.layers[l]) << ": " << edited.touched[l] << " channels touched\n";
-  }
-  std::cout << set.layers.size() << " layers; " << clipping(set, edited) << "\n";
+/// What can be told of layers that lie over the signals: samples at the limit, or what is wrong with all of them together.
+std::string outcome_of_layers(const SignalSet& set) {
+  const std::string too_large = signal::broken_rule(set.layers, set.activation, set.channels, retarget::kPassiveActivation);
+  return too_large.empty() ? clipping(set, retarget::edited_activations(set)) : too_large;
 }
 
+void list_layers(const SignalsOptions& options) {
+  if (options.json) {
+    std::cout << io::layers_text(io::read_signals(signals_path(options)));
+    return;
+  }
+  auto [set, filed] = io::read_signals_to_mend(signals_path(options));
+  bool are_sound = true;
+  for (std::size_t l = 0; l < filed.size(); ++l) {
+    const auto& [name, layer, fault] = filed[l];
+    std::cout << l + 1 << " " << (layer ? description(*layer) : "'" + name + "'") << ": ";
+    if (fault.empty()) {
+      std::cout << signal::selected_channels(layer->selection, set.channels).size() << " channels touched\n";
+      set.layers.push_back(*layer);
+    } else {
+      std::cout << "refused: " << fault << "\n";
+      are_sound = false;
+    }
+  }
+  std::cout << filed.size() << " layers; " << (are_sound ? outcome_of_layers(set) : "'hydrostat signals DIR reset' drops those that are refused, or all")
+            << "\n";
+}
+
+/// The layers that are kept must be such that they can be written again, not such that they can be played.
 void reset(const SignalsOptions& options, bool only_one) {
-  SignalSet set = io::read_signals(signals_path(options));
-  const auto count = static_cast<int>(set.layers.size());
+  auto [set, filed] = io::read_signals_to_mend(signals_path(options));
+  const auto count = static_cast<int>(filed.size());
   if (only_one && (options.layer < 1 || options.layer > count)) {
     throw usage("--layer",
                 "layer " + std::to_string(options.layer) + " is not among the " + std::to_string(count) + " that exist",
                 "'hydrostat signals DIR layers' lists them.");
   }
-  if (only_one) {
-    set.layers.erase(set.layers.begin() + options.layer - 1);
-  } else {
-    set.layers.clear();
+  bool are_sound = true;
+  for (int l = 1; only_one && l <= count; ++l) {
+    const io::SignalsToMend::FiledLayer& kept = filed[static_cast<std::size_t>(l - 1)];
+    if (l == options.layer) continue;
+    if (!kept.layer) {
+      throw Error(signals_path(options).string(), "layer " + std::to_string(l), kept.fault, "Drop it first, or all layers: leave --layer out.");
+    }
+    are_sound = are_sound && kept.fault.empty();
+    set.layers.push_back(*kept.layer);
   }
   io::write_signals(signals_path(options), set);
   std::cout << count - static_cast<int>(set.layers.size()) << " layers dropped, " << set.layers.size() << " left; "
-            << clipping(set, retarget::edited_activations(set)) << "\n";
+            << (are_sound ? outcome_of_layers(set) : "'hydrostat signals DIR layers' tells which of them are refused") << "\n";
 }
 
 // ---- their options

@@ -33,7 +33,15 @@ BatchResult result_of(const nlohmann::ordered_json& entry) {
   entry.at("settings").get_to(result.settings);
   entry.at("report_sha256").get_to(result.report_sha256);
   entry.at("figures").get_to(result.figures);
+  if (entry.contains("warnings")) entry.at("warnings").get_to(result.warnings);
   return result;
+}
+
+/// Null when there is none, or one that cannot be read.
+nlohmann::json report_of(const fs::path& creature) {
+  if (!fs::is_regular_file(creature / "report.json")) return {};
+  const nlohmann::json report = nlohmann::json::parse(read_file(creature / "report.json"), nullptr, /*allow_exceptions=*/false);
+  return report.is_object() ? report : nlohmann::json();
 }
 
 }  // namespace
@@ -52,21 +60,29 @@ const std::vector<std::string>& batch_figures() {
 
 std::map<std::string, double> read_batch_figures(const fs::path& creature) {
   std::map<std::string, double> figures;
-  if (!fs::is_regular_file(creature / "report.json")) return figures;
-  const nlohmann::json report =
-      nlohmann::json::parse(read_file(creature / "report.json"), nullptr, /*allow_exceptions=*/false);
+  const nlohmann::json report = report_of(creature);
   for (const std::string& name : batch_figures()) {
     const nlohmann::json::json_pointer place("/replay/closed_loop/" + name);
-    if (report.is_object() && report.contains(place) && report[place].is_number()) figures[name] = report[place];
+    if (report.contains(place) && report[place].is_number()) figures[name] = report[place];
   }
   return figures;
+}
+
+std::vector<std::string> read_batch_warnings(const fs::path& creature) {
+  std::vector<std::string> warnings;
+  const nlohmann::json report = report_of(creature);
+  if (!report.contains("warnings")) return warnings;
+  for (const nlohmann::json& warning : report["warnings"]) {
+    if (warning.is_string()) warnings.push_back(warning);
+  }
+  return warnings;
 }
 
 std::string batch_results_csv(const std::vector<BatchResult>& results) {
   std::ostringstream out;
   out << "name,clip,out,state,exit_code,seconds";
   for (const std::string& figure : batch_figures()) out << "," << figure;
-  out << ",message\r\n";
+  out << ",warnings,message\r\n";
   for (const BatchResult& result : results) {
     out << quoted(result.name) << "," << quoted(result.clip) << "," << quoted(result.out) << "," << quoted(result.state)
         << "," << result.exit_code << "," << result.seconds;
@@ -74,7 +90,7 @@ std::string batch_results_csv(const std::vector<BatchResult>& results) {
       out << ",";
       if (result.figures.contains(figure)) out << result.figures.at(figure);
     }
-    out << "," << quoted(result.message) << "\r\n";
+    out << "," << result.warnings.size() << "," << quoted(result.message) << "\r\n";
   }
   return out.str();
 }
@@ -91,7 +107,8 @@ std::string batch_results_json(const std::vector<BatchResult>& results) {
                        {"message", result.message},
                        {"settings", result.settings},
                        {"report_sha256", result.report_sha256},
-                       {"figures", result.figures}});
+                       {"figures", result.figures},
+                       {"warnings", result.warnings}});
   }
   const auto failed = std::count_if(results.begin(), results.end(), [](const BatchResult& r) { return r.exit_code != 0; });
   const nlohmann::ordered_json root{{"schema", kSchema}, {"jobs", results.size()}, {"failed", failed}, {"results", entries}};

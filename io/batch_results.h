@@ -17,6 +17,7 @@ struct BatchResult {
   std::string settings;                   // fingerprint of program, clip and options
   std::string report_sha256;              // of report.json as the job left it; empty when there is none
   std::map<std::string, double> figures;  // of the closed loop, by their names in report.json
+  std::vector<std::string> warnings;      // those of report.json
 };
 
 /// The figures that the results table shows, in the order of its columns.
@@ -25,7 +26,10 @@ const std::vector<std::string>& batch_figures();
 /// Those of them that DIR/report.json holds as numbers; none when there is no report.
 std::map<std::string, double> read_batch_figures(const std::filesystem::path& creature);
 
-/// A table with a header, one line a job, texts quoted as RFC 4180 asks.
+/// The warnings in DIR/report.json; none when there is no report.
+std::vector<std::string> read_batch_warnings(const std::filesystem::path& creature);
+
+/// A table with a header, one line a job, texts quoted as RFC 4180 asks; of warnings it has the number.
 std::string batch_results_csv(const std::vector<BatchResult>& results);
 
 /// Schema "hydrostat.batch/1": {schema, jobs, failed, results}.

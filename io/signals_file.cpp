@@ -1,7 +1,9 @@
 #include "io/signals_file.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -21,6 +23,7 @@ using signal::Spectrum;
 constexpr const char* kSchema = "hydrostat.signals/1";
 constexpr const char* kListSchema = "hydrostat.signals_list/1";
 constexpr int kMostSamples = 100'000;  // minutes at any control rate: more is a slip of the pen
+constexpr const char* kDropLayers = "'hydrostat signals DIR reset' drops layers";
 
 const char* kind_name(Kind kind) { return kind == Kind::loop ? "loop" : "one_shot"; }
 
@@ -208,6 +211,24 @@ class Place {
   std::string where_;
 };
 
+/// Numbers beyond double, on which the parser stops, become null: what reads them then tells where they are.
+std::string without_infinite_numbers(const std::string& text) {
+  std::string result;
+  bool is_in_quotes = false;
+  for (std::size_t i = 0; i < text.size();) {
+    const bool is_number = !is_in_quotes && (text[i] == '-' || std::isdigit(static_cast<unsigned char>(text[i])) != 0);
+    std::size_t end = i + 1;
+    if (is_number) end = text.find_first_not_of("+-.0123456789eE", i);
+    if (is_in_quotes && text[i] == '\\') ++end;  // with what it escapes
+    end = std::min(end, text.size());
+    const std::string piece = text.substr(i, end - i);
+    if (piece == "\"") is_in_quotes = !is_in_quotes;
+    result += is_number && std::isinf(std::strtod(piece.c_str(), nullptr)) ? "null" : piece;
+    i = end;
+  }
+  return result;
+}
+
 Json parsed_json(const std::string& text, const std::string& file) {
   try {
     return Json::parse(text);
@@ -217,7 +238,7 @@ Json parsed_json(const std::string& text, const std::string& file) {
     throw Error(file, "line " + std::to_string(line), "not JSON there",
                 "Mend the line: a comma, quotation mark or bracket is amiss.");
   } catch (const Json::exception&) {  // a number beyond double
-    throw Error(file, "", "has a number that is too large", "Write finite numbers.");
+    throw Error(file, "", "has a number that is too large", std::string("Write finite numbers; where a layer has it, ") + kDropLayers + ".");
   }
 }
 
@@ -280,15 +301,33 @@ std::variant<signal::SetHarmonic, signal::Gain, signal::Shift, signal::Filter> r
   edit.refuse("'" + name + "' is no edit", "Write \"set\", \"gain\", \"shift\" or \"filter\".");
 }
 
-signal::Layer read_layer(const Place& place, Kind kind, int samples) {
+signal::Layer read_layer(const Place& place) {
   signal::Layer layer{place.at("name").text(), {}, read_edit(place)};
   if (place.has("channel")) layer.selection.channel = place.at("channel").text();
   if (place.has("bone")) layer.selection.group = place.at("bone").text();
   if (place.has("band")) layer.selection.band = read_band(place.at("band"));
   if (place.has("range")) layer.selection.range = read_range(place.at("range"));
-  const std::string broken = signal::broken_rule(layer, kind, samples);
-  if (!broken.empty()) place.refuse(broken, "Change the number, or drop the layer.");
   return layer;
+}
+
+signal::Layer read_sound_layer(const Place& place, const SignalSet& set) {
+  const signal::Layer layer = read_layer(place);
+  const std::string broken = signal::broken_rule(layer, set.kind(), set.samples());
+  if (!broken.empty()) place.refuse(broken, std::string("Change the number, or drop the layer: ") + kDropLayers + ".");
+  return layer;
+}
+
+SignalsToMend::FiledLayer read_filed_layer(const Place& entry, const SignalSet& set) {
+  const Place place = entry.called("");  // faults are told of the layer itself
+  SignalsToMend::FiledLayer filed;
+  try {
+    filed.name = place.at("name").text();
+    filed.layer = read_layer(place);
+    filed.fault = signal::broken_rule(*filed.layer, set.kind(), set.samples());
+  } catch (const Error& error) {
+    filed.fault = error.where.empty() ? error.what() : error.where + ": " + error.what();
+  }
+  return filed;
 }
 
 void read_channel(const Place& place, Eigen::Index c, SignalSet& set) {
@@ -321,26 +360,8 @@ Spectrum empty_spectrum(Kind kind, int samples, int harmonics, Eigen::Index chan
   return {kind, samples, zero, loop ? zero : Eigen::MatrixXd(0, channels), Eigen::MatrixXd::Zero(loop ? 0 : 4, channels)};
 }
 
-}  // namespace
-
-std::string signals_text(const SignalSet& set) {
-  Json json;
-  json["schema"] = kSchema;
-  json["kind"] = kind_name(set.kind());
-  json["period_s"] = set.period_s;
-  json["samples"] = set.samples();
-  json["rate_hz"] = set.rate_hz();
-  json["harmonics"] = set.activation.harmonics();
-  json["limit"] = set.limit;
-  json["layers"] = layers_json(set);
-  json["channels"] = Json::array();
-  for (Eigen::Index c = 0; c < set.count(); ++c) json["channels"].push_back(channel_json(set, c));
-  return printed(json);
-}
-
-SignalSet parse_signals(const std::string& text, const std::string& file) {
-  const Json json = parsed_json(text, file);
-  const Place root(json, file, "");
+/// All but the layers.
+SignalSet read_solved(const Place& root) {
   check_schema(root);
   const Kind kind = read_kind(root.at("kind"));
   const int samples = root.at("samples").whole_number(kind == Kind::loop ? 2 : 4, kMostSamples);
@@ -365,10 +386,34 @@ SignalSet parse_signals(const std::string& text, const std::string& file) {
     if (names.insert(set.channels[c].name).second) continue;
     channels.entry(c).refuse("'" + set.channels[c].name + "' stands there twice", "Give every channel a name of its own.");
   }
+  return set;
+}
+
+}  // namespace
+
+std::string signals_text(const SignalSet& set) {
+  Json json;
+  json["schema"] = kSchema;
+  json["kind"] = kind_name(set.kind());
+  json["period_s"] = set.period_s;
+  json["samples"] = set.samples();
+  json["rate_hz"] = set.rate_hz();
+  json["harmonics"] = set.activation.harmonics();
+  json["limit"] = set.limit;
+  json["layers"] = layers_json(set);
+  json["channels"] = Json::array();
+  for (Eigen::Index c = 0; c < set.count(); ++c) json["channels"].push_back(channel_json(set, c));
+  return printed(json);
+}
+
+SignalSet parse_signals(const std::string& text, const std::string& file) {
+  const Json json = parsed_json(text, file);
+  const Place root(json, file, "");
+  SignalSet set = read_solved(root);
   const Place layers = root.at("layers");
-  for (std::size_t l = 0; l < layers.list_size(); ++l) set.layers.push_back(read_layer(layers.entry(l), kind, samples));
+  for (std::size_t l = 0; l < layers.list_size(); ++l) set.layers.push_back(read_sound_layer(layers.entry(l), set));
   const std::string too_large = signal::broken_rule(set.layers, set.activation, set.channels, retarget::kPassiveActivation);
-  if (!too_large.empty()) layers.refuse(too_large, "Give it a smaller number, or drop it.");
+  if (!too_large.empty()) layers.refuse(too_large, std::string("Give it a smaller number, or drop it: ") + kDropLayers + ".");
   return set;
 }
 
@@ -382,6 +427,15 @@ void write_signals(const std::filesystem::path& file, const SignalSet& set) {
 }
 
 SignalSet read_signals(const std::filesystem::path& file) { return parse_signals(read_file(file), file.string()); }
+
+SignalsToMend read_signals_to_mend(const std::filesystem::path& file) {
+  const Json json = parsed_json(without_infinite_numbers(read_file(file)), file.string());
+  const Place root(json, file.string(), "");
+  SignalsToMend signals{read_solved(root), {}};
+  const Place layers = root.at("layers");
+  for (std::size_t l = 0; l < layers.list_size(); ++l) signals.layers.push_back(read_filed_layer(layers.entry(l), signals.solved));
+  return signals;
+}
 
 std::string signals_list_text(const SignalSet& set, const retarget::EditedActivations& edited,
                               const std::vector<retarget::BoneSignals>& bones) {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "retarget/signal_set.h"
 
@@ -26,6 +28,20 @@ void write_signals(const std::filesystem::path& file, const retarget::SignalSet&
 
 /// Throws Error also where the file cannot be read.
 retarget::SignalSet read_signals(const std::filesystem::path& file);
+
+/// Signals, and apart from them their layers as the file has them, for whoever mends what read_signals refuses there.
+struct SignalsToMend {
+  struct FiledLayer {
+    std::string name;                    // empty where it has none
+    std::optional<signal::Layer> layer;  // none where it cannot be read
+    std::string fault;                   // what is wrong with it alone; empty: nothing
+  };
+  retarget::SignalSet solved;  // without layers
+  std::vector<FiledLayer> layers;
+};
+
+/// Throws Error as read_signals does, but not for what is wrong with a layer or with all of them together.
+SignalsToMend read_signals_to_mend(const std::filesystem::path& file);
 
 /// What `hydrostat signals DIR list --json` prints, schema "hydrostat.signals_list/1".
 std::string signals_list_text(const retarget::SignalSet& set, const retarget::EditedActivations& edited,

@@ -105,6 +105,7 @@ std::vector<std::string> feedback_warnings(const Performances& performances, con
 }
 
 bool is_assisted(const ReplayReport& run) { return run.external_assist_mg > kAssist; }
+bool is_assisted(const SimulationReport& run) { return run.external_assist_mg > kAssist; }
 
 std::vector<std::string> motion_warnings(const ReplayReport& run) {
   std::vector<std::string> warnings;
@@ -120,6 +121,14 @@ std::vector<std::string> motion_warnings(const ReplayReport& run) {
                                 100 * run.clip_shape_rms_length));
   }
   return warnings;
+}
+
+std::vector<std::string> motion_warnings(const SimulationReport& run) {
+  if (!is_assisted(run)) return {};
+  return {sentence("assist: the body is not moved by its scene alone: the solver's guard took over %d steps that would have gone astray, and turned it "
+                   "in the air by what none of the scene's forces gave, as much as %.2g times its weight; simulate again with --method euler, a "
+                   "smaller dt_s or a softer body",
+                   run.guard_steps, run.external_assist_mg)};
 }
 
 std::vector<std::string> polish_warnings(const Polished& polished) {

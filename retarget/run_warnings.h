@@ -25,8 +25,12 @@ constexpr double kAssist = 1e-6;
 /// Whether something else than the creature's own forces and the world's had a hand in a run.
 bool is_assisted(const ReplayReport& run);
 
+bool is_assisted(const SimulationReport& run);
+
 /// What the figures of the main run say against it: that it was assisted, or that its skin is far from the clip's. A fall is told elsewhere.
 std::vector<std::string> motion_warnings(const ReplayReport& run);
+/// The same of a scene's simulation, which has no clip.
+std::vector<std::string> motion_warnings(const SimulationReport& run);
 
 /// Of polished signals that were left out, for they cost bodies off the plan their balance.
 std::vector<std::string> polish_warnings(const Polished& polished);

@@ -24,7 +24,8 @@ case "$(basename "$2")" in
   killed.fbx) kill -9 $$ ;;
 esac
 mkdir -p "$4"
-echo "{\"replay\": {\"closed_loop\": {\"cycles\": 15}}}" >"$4/report.json"
+warnings=$(cat "$2.warnings" 2>/dev/null)
+echo "{\"replay\": {\"closed_loop\": {\"cycles\": 15}}, \"warnings\": [$warnings]}" >"$4/report.json"
 [ "$(basename "$2")" != short.fbx ] || exit 3
 )sh");
     fs::permissions(path / "program", fs::perms::owner_all);
@@ -61,6 +62,20 @@ TEST(Batch, IsDoneWhenEveryJobIs) {
   EXPECT_EQ(workshop.results()[0].state, "done");
   EXPECT_EQ(workshop.results()[0].figures.at("cycles"), 15);
   EXPECT_TRUE(fs::exists(workshop.path / "batch.results.csv"));
+}
+
+TEST(Batch, TellsWhichJobsHadWarnings) {
+  const Workshop workshop;
+  workshop.manifest({"one", "two", "three"});
+  io::write_file(workshop.path / "two.fbx.warnings", R"("it leans", "it floats")");
+  io::write_file(workshop.path / "three.fbx.warnings", R"("it leans")");
+  const Outcome outcome = workshop.run();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* words : {"one: done\n", "two: done (2 warnings)\n", "three: done (1 warning)\n", "3 jobs, 0 failed, 2 with warnings, see "}) {
+    EXPECT_NE(outcome.err.find(words), std::string::npos) << words << outcome.err;
+  }
+  EXPECT_EQ(workshop.results()[1].warnings, (std::vector<std::string>{"it leans", "it floats"}));
+  EXPECT_NE(io::read_file(workshop.path / "batch.results.csv").find(",2,\"\"\r\n"), std::string::npos);
 }
 
 TEST(Batch, GoesOnPastJobsThatFail) {

@@ -133,6 +133,44 @@ TEST_F(SignalsCommand, LayersListsAndResetDropsThem) {
   EXPECT_TRUE(stored().layers.empty());
 }
 
+/// However a layer was spoilt by hand, 'layers' tells of it and 'reset' mends the file.
+TEST_F(SignalsCommand, ResetMendsWhatNoOtherVerbTakes) {
+  const std::string before = text_of(file());
+  const auto spoil = [&](const std::string& layers) {
+    std::string text = before;
+    text.replace(text.find("\"layers\": []"), 12, "\"layers\": [" + layers + "]");
+    std::ofstream(file()) << text;
+  };
+  const std::string huge = R"({"name": "huge", "edit": "gain", "factor": 1e150})", none = R"({"name": "none", "edit": "gain", "factor": 1e400})",
+                    odd = R"({"name": "odd", "edit": "bend"})", off = R"({"name": "off", "edit": "shift", "by": 3})";
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {huge + "," + huge, "2 layers; layer 'huge' makes the signals too large to be reckoned with"},
+      {none, "1 'none': refused: factor: not a number"},
+      {odd, "1 'odd': refused: edit: 'bend' is no edit"},
+      {off, "1 'off': shift by 3 of the period, channel '*', bone '*': refused: shift is not a share"},
+      {"7", "1 '': refused: not an object"}};
+  for (const auto& [layers, told] : cases) {
+    SCOPED_TRACE(layers);
+    spoil(layers);
+    EXPECT_EQ(run("list").exit_code, 1);
+    expect_said(run("layers"), 0, {told});
+    expect_said(run("reset"), 0, {" layers dropped, 0 left; "});
+    EXPECT_EQ(text_of(file()), before);
+  }
+  spoil(huge + "," + huge + "," + huge);
+  expect_said(run("reset --layer 1"), 0, {"1 layers dropped, 2 left; layer 'huge' makes the signals too large"});
+  expect_said(run("reset --layer 1"), 0, {"1 layers dropped, 1 left; ", " samples held at the limit"});
+  spoil(odd + "," + off + "," + none);
+  expect_said(run("reset --layer 2"), 1, {"signals.json: layer 1: edit: 'bend' is no edit. Drop it first, or all layers: leave --layer out."});
+  spoil(odd + "," + off);
+  expect_said(run("reset --layer 1"), 0, {"1 layers dropped, 1 left; 'hydrostat signals DIR layers' tells which of them are refused"});
+  spoil("");
+  std::string text = before;
+  text.replace(text.find("\"period_s\": 0.8"), 15, "\"period_s\": 1e400");
+  std::ofstream(file()) << text;
+  expect_said(run("reset"), 1, {"signals.json: period_s: not a number"});
+}
+
 TEST_F(SignalsCommand, ResetBringsTheFileBackToTheByte) {
   const std::string before = text_of(file());
   run("gain --factor 2");

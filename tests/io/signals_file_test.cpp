@@ -4,9 +4,12 @@
 
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 
 #include "io/signals_plot.h"
+#include "io/write_file.h"
 #include "retarget/error.h"
 #include "tests/signal/random_samples.h"
 
@@ -110,6 +113,28 @@ std::string small_file() {
      "force": {"cosine": [0, 2], "sine": [0, 3]}}
   ]
 })";
+}
+
+void collect_names(const nlohmann::json& value, std::set<std::string>& names) {
+  if (!value.is_structured()) return;
+  for (const auto& [key, entry] : value.items()) {
+    if (value.is_object()) names.insert(key);
+    collect_names(entry, names);
+  }
+}
+
+TEST(SignalsFile, IsToldInTheReadmeMemberByMember) {
+  const std::string readme = read_file(HYDROSTAT_README);
+  const std::size_t begin = readme.find("\n## signals.json\n");
+  ASSERT_NE(begin, std::string::npos);
+  const std::string section = readme.substr(begin, readme.find("\n## ", begin + 1) - begin);
+  std::set<std::string> names;
+  for (const Kind kind : {Kind::loop, Kind::one_shot}) collect_names(nlohmann::json::parse(signals_text(random_signals(1, kind))), names);
+  EXPECT_GT(names.size(), 20U);
+  for (const std::string& name : names) {
+    if (name == "schema") continue;
+    EXPECT_NE(section.find('`' + name + '`'), std::string::npos) << name;
+  }
 }
 
 TEST(SignalsFile, TakesWhatAPersonWrites) {

@@ -120,5 +120,17 @@ TEST(MotionWarnings, TellOfWhatCarriedTheCreatureAndOfAStrangeShape) {
   EXPECT_TRUE(motion_warnings(run).empty());
 }
 
+TEST(MotionWarnings, TellOfWhatCarriedTheBodyOfAScene) {
+  SimulationReport run;
+  run.guard_steps = 12;
+  run.external_assist_mg = 1e-9;  // of rounding
+  EXPECT_TRUE(motion_warnings(run).empty());
+  run.external_assist_mg = 2.5;
+  ASSERT_EQ(motion_warnings(run).size(), 1U);
+  for (const char* word : {"assist: the body is not moved by its scene alone", "12 steps", "2.5 times its weight", "--method euler"}) {
+    EXPECT_NE(motion_warnings(run)[0].find(word), std::string::npos) << motion_warnings(run)[0];
+  }
+}
+
 }  // namespace
 }  // namespace hydrostat::retarget::run_warnings_test

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 
 #include "cli/choice_record.h"
 #include "cli/conversion_report.h"
@@ -40,11 +41,36 @@ std::string key_of(const io::ImportedCharacter& imported) {
   return key_after(io::file_sha256("/proc/self/exe"), io::packed(io::record_of(imported), "import", ""));
 }
 
-/// Layers of the creature that is about to be replaced; a sentence for each that does not fit any more.
-std::vector<std::string> keep_earlier_layers(const fs::path& creature, retarget::SignalSet& signals) {
+std::optional<io::CreatureRecord> record_in(const fs::path& creature) {
+  try {
+    return io::read_creature_record(creature);
+  } catch (const Error&) {  // it is about to be replaced
+    return std::nullopt;
+  }
+}
+
+/// Whether what the creature was made of is the clip that is converted now, even if its file has changed since.
+bool is_same_clip(const io::CreatureRecord& before, const retarget::SourceReport& source) {
+  const auto place = [](const fs::path& file) { return fs::absolute(file).lexically_normal(); };
+  return before.clip == source.clip && (before.source_sha256 == source.sha256 || place(before.source_file) == place(source.file));
+}
+
+/// Layers of the creature that is about to be replaced, where they are of the same clip; a sentence for each that does not fit any more,
+/// and where the clip's file has changed or is another.
+std::vector<std::string> keep_earlier_layers(const fs::path& creature, const retarget::SourceReport& source, retarget::SignalSet& signals) {
   const fs::path file = creature / "signals.json";
   if (!io::is_creature(creature) || !fs::exists(file)) return {};
-  return retarget::keep_layers(io::read_signals(file), signals);
+  const retarget::SignalSet earlier = io::read_signals(file);
+  if (earlier.layers.empty()) return {};
+  const std::optional<io::CreatureRecord> before = record_in(creature);
+  const std::string left_out = "layers: the signals' edits (" + std::to_string(earlier.layers.size()) + ") were left out, for ";
+  if (!before) return {left_out + "creature.toml does not tell of which clip they are"};
+  if (!is_same_clip(*before, source)) return {left_out + "they are of the clip '" + before->clip + "' of " + before->source_file};
+  std::vector<std::string> told = retarget::keep_layers(earlier, signals);
+  if (before->source_sha256 != source.sha256) {
+    told.push_back("layers: " + source.file + " has changed since the signals were edited; 'hydrostat signals DIR layers' lists the edits, 'reset' drops them");
+  }
+  return told;
 }
 
 Eigen::VectorXi dominant_bones_of_nodes(const Eigen::MatrixXd& bone_weights) {
@@ -204,7 +230,7 @@ void Conversion::solve_signals() {
   report.signals = signals_report(signals_);
   report.signals.error_rms_l0 = retarget::activation_error_rms(signals_, inverse_.activation.transpose());
   target_file_ = io::target_bytes(target_);  // before what a replay will tell anew
-  add_warnings(keep_earlier_layers(options_.out, signals_));
+  add_warnings(keep_earlier_layers(options_.out, report.source, signals_));
   signals_text_ = io::signals_text(signals_);
 }
 
@@ -331,7 +357,8 @@ void Conversion::write() {
     return 0;
   });
   target_.report.timing_s = stages_.timing_s;
-  write_outcome(writer_, this->performer(), appearance_, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr);
+  write_outcome(writer_, this->performer(), appearance_, signals_, performances_, target_.report, chosen_ ? &chosen_->curve : nullptr,
+                exports_of(options_));
 }
 
 }  // namespace hydrostat::cli

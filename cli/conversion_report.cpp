@@ -64,7 +64,9 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
                      {"rest_lengths", std::string(settings.fitted_rest_lengths ? "fitted" : "usual")},
                      {"load", std::string(settings.spread_load ? "spread" : "usual")},
                      {"seed", std::int64_t{options.seed}}};
-  for (const std::string& mesh : options.import.meshes) record.settings.emplace_back("mesh", mesh);
+  for (std::size_t k = 0; k < options.import.meshes.size(); ++k) {  // TOML knows a key once
+    record.settings.emplace_back(k == 0 ? "mesh" : "mesh-" + std::to_string(k + 1), options.import.meshes[k]);
+  }
   if (!options.import.root.empty()) record.settings.emplace_back("root", options.import.root);
   if (!options.import.up.empty()) record.settings.emplace_back("up", options.import.up);
   if (options.import.metres_per_unit > 0) record.settings.emplace_back("unit", options.import.metres_per_unit);
@@ -73,6 +75,7 @@ io::CreatureRecord creature_record(const ConvertOptions& options, const retarget
   if (!options.scene.empty()) record.settings.emplace_back("scene", fs::absolute(options.scene).string());
   if (chosen) record.settings.emplace_back("step_s", chosen->setting.dt_s);
   io::put_feedback(feedback, record);
+  io::put_exports(exports_of(options), record);
   for (const retarget::EffectReport& effect : report.effects) record.effects.push_back({effect.name, effect.state, effect.reason});
   return record;
 }

@@ -27,7 +27,9 @@ io::ImportedCharacter import(const ConvertOptions& options) {
 int convert(const ConvertOptions& options) {
   const double limit = wished_limit(options);
   const retarget::CreatureOptions settings = creature_options(options);
-  if (options.accuracy.is_asked()) options.accuracy.most("hydrostat convert");  // refused now, not after the body is made
+  // Refused now, not after the body is made.
+  exports_of(options);
+  if (options.accuracy.is_asked()) options.accuracy.most("hydrostat convert");
   Progress progress(std::cerr, progress_style(options.quiet));
   Stages stages(progress);
   const io::ImportedCharacter imported = stages.run("import", [&] { return import(options); });
@@ -42,6 +44,7 @@ int convert(const ConvertOptions& options) {
     throw writer.as_seen(error);
   }
   writer.commit();
+  note_warnings(progress, conversion.report().warnings);
   const retarget::Replay& run = conversion.performances().main();
   const std::string motion_file = (fs::path(options.out) / "failed.glb").string();
   const std::string way_up = is_down(run) ? "try " + change_of_conversion(run) : "";

@@ -77,6 +77,8 @@ bool wants_polish(const ConvertOptions& options, bool leaps_on) {
   return options.polish == "on" || (options.polish == "auto" && !leaps_on && (grade == "standard" || grade == "final"));
 }
 
+io::Exports exports_of(const ConvertOptions& options) { return exports_of(options.exports, {}, "hydrostat convert"); }
+
 double wished_limit(const ConvertOptions& options) {
   return options.limit == "auto" ? 0 : parse_number(options.limit, kLeastLimit, kMostLimit, "hydrostat convert", "--limit");
 }
@@ -127,6 +129,7 @@ void add_convert_options(CLI::App& app, ConvertOptions& options) {
                  "but for a loop that leaps")
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->capture_default_str();
+  add_export_options(app, options.exports, "");
   app.add_option("--seed", options.seed, "Other than 0: the body that is let go differs from the plan by up to 2 % in "
                                                        "mass, friction and stiffness, drawn from this number")
       ->capture_default_str();

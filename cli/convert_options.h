@@ -4,6 +4,7 @@
 #include <string>
 
 #include "cli/asked_accuracy.h"
+#include "cli/export_option.h"
 #include "cli/import_options.h"
 #include "retarget/creature.h"
 
@@ -23,6 +24,7 @@ struct ConvertOptions {
   bool calibrated = false, json = false, quiet = false;
   io::ImportOptions import;
   AskedAccuracy accuracy;
+  AskedExport exports;
 };
 
 /// Adds them all; `options` has to outlive the parsing.
@@ -33,6 +35,7 @@ retarget::CreatureOptions creature_options(const ConvertOptions& options);
 /// Whether the signals are to be polished. What leaps again and again is only where that is asked for: polished, it keeps its feet on fewer
 /// bodies that are not as planned.
 bool wants_polish(const ConvertOptions& options, bool leaps_on);
+io::Exports exports_of(const ConvertOptions& options);
 /// Of |activation - 1|; 0: automatic.
 double wished_limit(const ConvertOptions& options);
 

@@ -7,6 +7,7 @@
 
 #include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
+#include "io/creature_scene.h"
 #include "io/gltf_out.h"
 #include "io/performance_page.h"
 #include "io/report.h"
@@ -65,19 +66,28 @@ std::string curve_picture(const io::CreatureWriter& writer, const retarget::RunR
 
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
                    const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report,
-                   const io::AccuracyCurve* curve) {
+                   const io::AccuracyCurve* curve, const io::Exports& exports) {
   const retarget::Replay& run = performances.main();
   const bool down = !report.outcome_ok;
   const retarget::MovingMorphs wobble = retarget::wobble_morphs(performer, run.motion);
   const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, wobble);
-  io::write_skinned_glb(writer.directory() / (down ? "failed.glb" : "replay.glb"),
-                        {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
-                        performer.mesh, performer.scene.body.mass, retarget::in_world(performer.world, run.motion, 0), {});
+  const io::EmbeddedSkin skin{performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn};
+  const retarget::Motion motion = retarget::in_world(performer.world, run.motion, 0);
+  const std::filesystem::path file = writer.directory() / (down ? "failed.glb" : "replay.glb");
+  io::write_skinned_glb(file, skin, performer.mesh, performer.scene.body.mass, motion, {});
   writer.remove(down ? "replay.glb" : "failed.glb");
+  for (const std::string& name : io::export_names("replay")) writer.remove(name);
+  if (!down) io::write_exports(file, skin, performer.mesh, performer.scene.body.mass, motion, exports);
   writer.write("report.json", io::report_json(report));
   io::write_performance_page(writer.directory() / "report.html", performer, appearance, signals, performances, report,
                              curve_picture(writer, report, curve), wobble);
   if (curve != nullptr) write_curve(writer, *curve);
+}
+
+void note_warnings(Progress& progress, const std::vector<std::string>& warnings, const std::string& told_elsewhere) {
+  for (const std::string& warning : warnings) {
+    if (told_elsewhere.empty() || !warning.starts_with(told_elsewhere)) progress.note("warning: " + warning);
+  }
 }
 
 retarget::SignalsReport signals_report(const retarget::SignalSet& signals) {
@@ -91,6 +101,8 @@ retarget::SignalsReport signals_report(const retarget::SignalSet& signals) {
 
 void measure(const retarget::Performer& performer, const retarget::SignalSet& signals, const retarget::PerformOptions& options,
              retarget::RunReport& report) {
+  const Eigen::Vector3d origin = io::scene_origin(performer);
+  report.source.scene_origin_m = {origin.x(), origin.y(), origin.z()};
   report.effects = retarget::effects_of(performer, options.replay);
   report.accuracy.method = physics::name_of(options.replay.method);
   const auto& elements = performer.scene.body.elements;

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "cli/progress.h"
 #include "io/accuracy_page.h"
 #include "io/appearance.h"
 #include "io/creature_directory.h"
+#include "io/exports.h"
 #include "retarget/performance.h"
 
 namespace hydrostat::cli {
@@ -18,11 +21,14 @@ std::string change_of_conversion(const retarget::Replay& replay);
 /// Puts the replays' figures into the report.
 void report_replays(const retarget::Performances& performances, retarget::RunReport& report);
 
-/// Writes replay.glb, or failed.glb where the outcome is short of what was asked, and takes the other one away; report.json and
-/// report.html; accuracy.csv and accuracy.svg of a curve.
+/// Writes replay.glb with its exports, or failed.glb where the outcome is short of what was asked, and takes the others away, for
+/// no export may show another motion than replay.glb; report.json and report.html; accuracy.csv and accuracy.svg of a curve.
 void write_outcome(io::CreatureWriter& writer, const retarget::Performer& performer, const io::Appearance& appearance,
                    const retarget::SignalSet& signals, const retarget::Performances& performances, const retarget::RunReport& report,
-                   const io::AccuracyCurve* curve);
+                   const io::AccuracyCurve* curve, const io::Exports& exports);
+
+/// What the report warns of, to be seen without opening it: a line each, but for what begins with `told_elsewhere`.
+void note_warnings(Progress& progress, const std::vector<std::string>& warnings, const std::string& told_elsewhere = "");
 
 /// The figures of a signal set; its error against the activations is not known here.
 retarget::SignalsReport signals_report(const retarget::SignalSet& signals);

@@ -8,6 +8,7 @@
 
 #include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
+#include "cli/export_option.h"
 #include "cli/level_option.h"
 #include "cli/level_trial.h"
 #include "cli/number_option.h"
@@ -38,6 +39,7 @@ struct ReplayCommand {
   std::string directory, out, scene, trace, wobble;
   AskedAccuracy accuracy;
   AskedLevel level;
+  AskedExport exports;
   double duration = 0, cycles = 0, trace_rate = 0;
   bool open_loop = false, json = false, quiet = false;
   std::vector<std::string> pushes;
@@ -132,14 +134,23 @@ retarget::PerformOptions in_its_world(retarget::PerformOptions options, const re
   return options;
 }
 
+/// Those of the creature unless given; of a file of its own the rate alone.
+io::Exports exports_of(const ReplayCommand& command, const io::CreatureRecord& record) {
+  io::Exports otherwise = io::exports_of(record);
+  if (!command.out.empty()) otherwise = {.rate_hz = otherwise.rate_hz};
+  return exports_of(command.exports, otherwise, kCommand);
+}
+
 /// The motion alone, for -o.
 int write_motion(const ReplayCommand& command, const retarget::Performer& performer, const io::Appearance& appearance,
-                 const retarget::Performances& performances, const std::string& way_up) {
+                 const retarget::Performances& performances, const io::Exports& exports, const std::string& way_up) {
   const retarget::Replay& run = performances.main();
   const fs::path file = is_down(run) ? fs::path(command.out).parent_path() / "failed.glb" : fs::path(command.out);
   const retarget::MovingMorphs worn = retarget::worn_with(performer.morphs, retarget::wobble_morphs(performer, run.motion));
-  io::write_skinned_glb(file, {performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn},
-                        performer.mesh, performer.scene.body.mass, retarget::in_world(performer.world, run.motion, 0), {});
+  const io::EmbeddedSkin skin{performer.skin.vertices, performer.skin.triangles, performer.embedding, &appearance, &worn};
+  const retarget::Motion motion = retarget::in_world(performer.world, run.motion, 0);
+  io::write_skinned_glb(file, skin, performer.mesh, performer.scene.body.mass, motion, {});
+  if (!is_down(run)) io::write_exports(file, skin, performer.mesh, performer.scene.body.mass, motion, exports);
   return tell_run(run, command.directory, file.string(), way_up);
 }
 
@@ -266,6 +277,14 @@ std::string usual_way_up(const ReplayCommand& command, const retarget::Replay& r
   return command.pushes.empty() ? "convert again with " + change_of_conversion(run) : "";
 }
 
+std::vector<std::string> beyond(const std::vector<std::string>& known, const std::vector<std::string>& warnings) {
+  std::vector<std::string> fresh;
+  for (const std::string& warning : warnings) {
+    if (std::find(known.begin(), known.end(), warning) == known.end()) fresh.push_back(warning);
+  }
+  return fresh;
+}
+
 /// Where no report does.
 void tell_accuracy(const ChosenStep& chosen, const retarget::Performer& performer) {
   retarget::RunReport run;
@@ -274,19 +293,33 @@ void tell_accuracy(const ChosenStep& chosen, const retarget::Performer& performe
   std::cout << saved_words(run);
 }
 
+/// What is the creature's own goes with its report.
+void refuse_own_motion(const ReplayCommand& command) {
+  for (const char* name : {"replay.glb", "failed.glb", "reference.glb"}) {
+    std::error_code ignored;  // what cannot be resolved is refused where it is read or written
+    if (fs::weakly_canonical(command.out, ignored) != fs::weakly_canonical(fs::path(command.directory) / name, ignored)) continue;
+    throw UsageError(kCommand, "option --out", "'" + command.out + "' is the creature's own " + name + ", which its report tells of",
+                     "Leave --out out to have replay.glb and the report anew, or name another file.");
+  }
+}
+
 int replay(const ReplayCommand& command) {
   if (!command.out.empty() && fs::path(command.out).extension() != ".glb") {
     throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
   }
+  if (!command.out.empty()) refuse_own_motion(command);
   Progress progress(std::cerr, progress_style(command.quiet));
   Stages stages(progress);
   const int every = steps_per_row(command, {});
   io::LoadedCreature creature = stages.run("load", [&] { return io::load_creature(command.directory); });
+  const std::vector<std::string> of_conversion = creature.target.report.warnings;  // which told them
   const retarget::Performer& performer = creature.target.performer;
   retarget::PerformOptions options = perform_options(command, creature);
   const WobbleChoice wobble(command.wobble, command.level.is_asked(), command.directory, creature);
   check_scene(command, creature);
+  const io::Exports exports = exports_of(command, creature.record);
   if (!command.out.empty()) io::refuse_unwritable_file(command.out);
+  if (!command.out.empty()) io::refuse_exports(command.out, exports);
   if (!command.trace.empty()) io::refuse_trace(command.trace);
   Levels levels(command, creature, options, stages);
   wobble.plan(creature.target.performer);
@@ -327,12 +360,13 @@ int replay(const ReplayCommand& command) {
   if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
   const bool is_met = !chosen || chosen->report.is_met();
   if (!command.json) tell_level(creature.target.report, command.directory);
+  note_warnings(progress, beyond(of_conversion, warnings), "level: ");
   const auto keep_trace = [&] {
     if (!command.trace.empty()) write_trace(command, performer.world, performances.main().trace, every);
   };
   if (!writer) {
     keep_trace();
-    const int exit_code = write_motion(command, performer, creature.appearance, performances, way_up);
+    const int exit_code = write_motion(command, performer, creature.appearance, performances, exports, way_up);
     if (chosen) tell_accuracy(*chosen, performer);
     if (is_met || exit_code != kDone) return exit_code;
     std::cerr << too_inaccurate(command.directory, told(*chosen)) << std::endl;
@@ -351,7 +385,12 @@ int replay(const ReplayCommand& command) {
   report_replays(performances, report);
   report.timing_s = stages.timing_s;
   try {
-    write_outcome(*writer, performer, creature.appearance, creature.signals, performances, report, chosen ? &chosen->curve : nullptr);
+    if (exports != io::exports_of(creature.record)) {
+      io::put_exports(exports, creature.record);
+      writer->write("creature.toml", io::to_toml(creature.record));
+    }
+    write_outcome(*writer, performer, creature.appearance, creature.signals, performances, report, chosen ? &chosen->curve : nullptr,
+                  exports);
   } catch (const Error& error) {
     throw writer->as_seen(error);
   }
@@ -391,6 +430,7 @@ void add_replay(CLI::App& app, int& exit_code) {
     replay_command->get_option("--lod")->excludes(replay_command->get_option(other));
   }
   add_wobble_option(*replay_command, command->wobble, "See 'hydrostat convert --help' [the creature's]");
+  add_export_options(*replay_command, command->exports, " [the creature's]");
   CLI::Option* seed = replay_command->add_option("--seed", command->seed, "See 'hydrostat convert --help' [the creature's]");
   CLI::Option* trace = replay_command->add_option("--trace", command->trace, "Directory for masses, positions, velocities, forces as NumPy files")
                              ->check(refuse_no_place);

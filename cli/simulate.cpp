@@ -11,6 +11,7 @@
 #include "cli/asked_accuracy.h"
 #include "cli/command_line.h"
 #include "cli/number_option.h"
+#include "cli/outcome.h"
 #include "cli/place_option.h"
 #include "cli/stages.h"
 #include "io/creature_directory.h"
@@ -19,6 +20,7 @@
 #include "io/simulation_files.h"
 #include "io/trace_writer.h"
 #include "retarget/accuracy.h"
+#include "retarget/run_warnings.h"
 #include "retarget/step_warning.h"
 
 namespace hydrostat::cli {
@@ -165,17 +167,18 @@ void write_files(io::CreatureWriter& writer, const io::SceneFile& scene, const r
 
 std::string summary(const retarget::RunReport& report, const std::string& where) {
   const retarget::SimulationReport& run = *report.simulation;
-  char text[300], torn[80] = "";
+  char text[300], torn[80] = "", assist[60] = "";
   if (!run.fractures.empty()) {
     std::snprintf(torn, sizeof torn, "; broke at %.3f s, %d piece%s", run.fractures.front().time_s, run.pieces_end, run.pieces_end == 1 ? "" : "s");
   }
+  if (retarget::is_assisted(run)) std::snprintf(assist, sizeof assist, "; assisted from outside by up to %.2g mg", run.external_assist_mg);
   std::snprintf(text, sizeof text,
                 ": %.3g s of %d nodes by '%s'; travel %.3f L, volume error %.2f %% at most, penetration %.2f %% D, %d "
                 "inverted elements; "
                 "%.1fx real time",
                 run.duration_s, report.body.nodes, report.accuracy.method.c_str(), run.travel_length,
                 100 * run.volume_error_max, 100 * run.penetration_max_size, run.inverted_elements, run.real_time_factor);
-  return where + text + torn;
+  return where + text + torn + assist;
 }
 
 int tell(const SimulateCommand& command, const retarget::RunReport& report) {
@@ -254,6 +257,7 @@ int simulate(const SimulateCommand& command) {
   report.simulation = simulation.report;
   report.outcome_ok = !simulation.report.diverged && report.accuracy.is_met();
   report.warnings = scene.warnings;
+  for (const std::string& warning : retarget::motion_warnings(simulation.report)) report.warnings.push_back(warning);
   report.timing_s = stages.timing_s;
   try {
     write_files(writer, scene, simulation, report, chosen);
@@ -261,6 +265,7 @@ int simulate(const SimulateCommand& command) {
     throw writer.as_seen(error);
   }
   writer.commit();
+  note_warnings(progress, report.warnings, "accuracy: ");
   if (!command.trace.empty()) io::write_trace(command.trace, simulation.trace);  // which may lie in the outcome
   return tell(command, report);
 }

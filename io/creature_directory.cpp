@@ -21,9 +21,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 17> kOwnFiles{
+constexpr std::array<std::string_view, 22> kOwnFiles{
     "creature.toml",  "scene.toml", "body.json",  "target.bin",  "path.bin",     "rig.bin",     "appearance.bin", "morphs.bin", "wobble.bin",
-    "signals.json", "reference.glb", "replay.glb", "failed.glb", "report.json", "report.html", "accuracy.csv", "accuracy.svg"};
+    "signals.json", "reference.glb", "replay.glb", "failed.glb", "report.json", "report.html", "accuracy.csv", "accuracy.svg",
+    "replay.pc2", "replay.mdd", "replay.obj", "replay.mtl", "replay_obj"};
 
 Error directory_error(const fs::path& shown_as, int error_number) {
   return {shown_as.string(), "", std::string("the directory cannot be written: ") + std::strerror(error_number),

@@ -122,11 +122,9 @@ std::vector<std::string> world_effects() {
   return names;
 }
 
-/// Reads the world's part around the creature's start. A creature keeps its level ground where the scene tells of none.
+/// Reads the world's part around its pivot. A creature keeps its level ground where the scene tells of none.
 void read_world(const TomlReader& root, retarget::ScenarioOf<3>& scenario, retarget::World& world, std::vector<std::string>& warnings) {
   const physics::Ground own = scenario.scene.ground;
-  const Vector3d com = physics::centre_of_mass(scenario.scene.body, scenario.start.x);
-  world.pivot = Vector3d(com.x(), 0, com.z());
   scenario.origin = -world.pivot;
   read_surroundings<3>(root, scenario, warnings);
   read_pushes<3>(root, scenario);
@@ -167,6 +165,11 @@ void write_out_mesh(const TomlReader& reader, toml::table& obstacle) {
 
 }  // namespace
 
+Vector3d scene_origin(const retarget::Performer& performer) {
+  const Vector3d com = physics::centre_of_mass(performer.scene.body, retarget::undriven_scenario(performer).start.x);
+  return {com.x(), 0, com.z()};
+}
+
 std::vector<std::string> put_in_scene(const std::filesystem::path& file, retarget::Performer& performer) {
   const toml::table table = parse_toml(file);
   const TomlReader root(table, file, "");
@@ -174,6 +177,7 @@ std::vector<std::string> put_in_scene(const std::filesystem::path& file, retarge
   std::vector<std::string> warnings;
   retarget::World world;
   retarget::ScenarioOf<3> scenario = retarget::undriven_scenario(performer);
+  world.pivot = scene_origin(performer);
   read_world(root, scenario, world, warnings);
   auto [wishes, friction] = read_wished_effects(root, world_effects(), scenario.scene.ground.friction);
   const std::string broken = retarget::plan_effects<3>(wishes, scenario);

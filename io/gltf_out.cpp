@@ -4,17 +4,14 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cassert>
 #include <cstring>
 #include <limits>
 #include <numeric>
 #include <sstream>
 
 #include "io/gltf_materials.h"
-#include "io/moving_morphs.h"
 #include "io/moving_normals.h"
 #include "io/write_file.h"
-#include "retarget/best_fit_rotation.h"
 #include "retarget/error.h"
 
 namespace hydrostat::io {
@@ -82,22 +79,6 @@ std::vector<float> floats(const Eigen::Ref<const Eigen::MatrixXd>& values) {
   return result;
 }
 
-/// Normals of the vertices, 3 x V: the mean of the triangles around, weighted by area; up where a vertex has none.
-Eigen::Matrix3Xd vertex_normals(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix3Xi& triangles) {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, vertices.cols());
-  for (Eigen::Index t = 0; t < triangles.cols(); ++t) {
-    const Eigen::Vector3i corner = triangles.col(t);
-    const Eigen::Vector3d a = vertices.col(corner[0]);
-    const Eigen::Vector3d twice_area = (vertices.col(corner[1]) - a).cross(vertices.col(corner[2]) - a);
-    for (int k : corner) normals.col(k) += twice_area;
-  }
-  for (Eigen::Index v = 0; v < normals.cols(); ++v) {
-    const double length = normals.col(v).norm();
-    normals.col(v) = length > 0 ? Eigen::Vector3d(normals.col(v) / length) : Eigen::Vector3d::UnitY();
-  }
-  return normals;
-}
-
 struct JointWeights {
   std::vector<unsigned short> joints;  // 4 a vertex
   std::vector<float> weights;          // 4 a vertex, heaviest first
@@ -119,16 +100,6 @@ JointWeights joint_weights(const retarget::Embedding& embedding) {
     }
   }
   return result;
-}
-
-/// A loop with its first frame, moved on by one period, as last; any other motion as it is.
-retarget::Motion with_closing_frame(const retarget::Motion& motion) {
-  if (!motion.loop || motion.count() == 0) return motion;
-  retarget::Motion closed = motion;
-  closed.loop = false;
-  closed.frames.conservativeResize(Eigen::NoChange, motion.count() + 1);
-  closed.at(motion.count()) = retarget::after_cycles(motion, 1) * Eigen::Matrix3Xd(motion.at(0));
-  return closed;
 }
 
 void add_positions(BufferWriter& buffer, const Eigen::Matrix3Xd& vertices, tinygltf::Primitive& primitive) {
@@ -175,16 +146,6 @@ tinygltf::Primitive part_of_skin(BufferWriter& buffer, const EmbeddedSkin& skin,
   add_property(buffer, "COLOR_0", part.colours, TINYGLTF_TYPE_VEC4, primitive.attributes);
   add_triangles(buffer, part.triangles, primitive);
   return primitive;
-}
-
-/// The appearance's parts, or all of the skin as one smooth part.
-std::vector<Appearance::Part> parts_of(const EmbeddedSkin& skin) {
-  if (skin.appearance != nullptr && !skin.appearance->parts.empty()) return skin.appearance->parts;
-  Appearance::Part whole;
-  whole.vertices = Eigen::VectorXi::LinSpaced(skin.vertices.cols(), 0, static_cast<int>(skin.vertices.cols()) - 1);
-  whole.triangles = skin.triangles;
-  whole.normals = vertex_normals(skin.vertices, skin.triangles);
-  return {whole};
 }
 
 /// What skin without a material looks like.
@@ -309,32 +270,22 @@ void add_targets(tinygltf::Model& model, BufferWriter& buffer, const std::vector
   mesh.extras = tinygltf::Value(tinygltf::Value::Object{{"targetNames", tinygltf::Value(names)}});
 }
 
-Eigen::Matrix3Xd embedded(const retarget::Embedding& embedding, const Eigen::Ref<const Eigen::Matrix3Xd>& nodes) {
-  Eigen::Matrix3Xd vertices = Eigen::Matrix3Xd::Zero(3, embedding.nodes.cols());
-  for (Eigen::Index v = 0; v < vertices.cols(); ++v) {
-    for (int k = 0; k < 4; ++k) vertices.col(v) += embedding.weights(k, v) * nodes.col(embedding.nodes(k, v));
-  }
-  return vertices;
-}
-
-void add_animation(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedSkin& skin,
-                   const std::vector<Appearance::Part>& parts, const retarget::ControlMesh& body,
-                   const Eigen::Ref<const Eigen::VectorXd>& mass, const retarget::Motion& motion,
-                   const GltfOptions& options) {
+void add_animation(tinygltf::Model& model, BufferWriter& buffer, const PlayedSkin& skin,
+                   const std::vector<Appearance::Part>& parts, const GltfOptions& options) {
+  const retarget::Motion& motion = skin.motion();
   const auto frames = static_cast<std::size_t>(motion.count());
   std::vector<float> times(frames);
   for (std::size_t f = 0; f < frames; ++f) times[f] = static_cast<float>(static_cast<double>(f) / motion.rate_hz);
   const int time = buffer.array(times, 0, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR);
   buffer.set_bounds(time, times);
 
-  const std::vector<Eigen::Quaterniond> rotations = retarget::best_fit_rotations(body.nodes, motion, mass);
   std::vector<float> turns;
-  for (const Eigen::Quaterniond& turn : rotations) {
+  for (const Eigen::Quaterniond& turn : skin.turns()) {
     for (double part : turn.coeffs()) turns.push_back(static_cast<float>(part));  // x, y, z, w, as glTF has it
   }
   std::vector<float> paths;  // joint by joint, so that each joint's keys lie together
   paths.reserve(static_cast<std::size_t>(motion.frames.size()));
-  for (Eigen::Index n = 0; n < body.nodes.cols(); ++n) {
+  for (Eigen::Index n = 0; n < motion.frames.rows() / 3; ++n) {
     const std::vector<float> path = floats(motion.frames.middleRows<3>(3 * n));
     paths.insert(paths.end(), path.begin(), path.end());
   }
@@ -351,23 +302,15 @@ void add_animation(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedS
   };
   const int turning = add_sampler(buffer.array(turns, 0, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC4));
   const int path_view = buffer.view(paths, 0);
-  for (int n = 0; n < body.node_count(); ++n) {
+  for (int n = 0; n < motion.frames.rows() / 3; ++n) {
     const std::size_t offset = static_cast<std::size_t>(n) * frames * 3 * sizeof(float);
     const int path = buffer.accessor(path_view, offset, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3, frames);
     animation.channels.push_back(channel(add_sampler(path), 2 + n, "translation"));
     animation.channels.push_back(channel(turning, 2 + n, "rotation"));
   }
-  const PlayedMorphs morphs = skin.morphs == nullptr ? PlayedMorphs()
-                                                     : play_morphs(*skin.morphs, skin.embedding, body, motion, rotations);
-  const auto skin_at = [&](Eigen::Index f) {
-    Eigen::Matrix3Xd vertices = embedded(skin.embedding, motion.at(f));
-    const Eigen::Matrix3d turn = rotations[static_cast<std::size_t>(f)].toRotationMatrix();
-    for (std::size_t k = 0; k < morphs.shapes.size(); ++k)
-      vertices += morphs.weights(static_cast<Eigen::Index>(k), f) * (turn * morphs.shapes[k]);
-    return vertices;
-  };
-  const SkinCourse course{embedded(skin.embedding, body.nodes), skin_at, motion.count()};
-  add_targets(model, buffer, parts, morphs, fit_normals(parts, course, rotations, morphs.shapes, morphs.weights), time,
+  const PlayedMorphs& morphs = skin.morphs();
+  const SkinCourse course{skin.carried_in_bind_pose(), [&](Eigen::Index f) { return skin.carried_at(f); }, motion.count()};
+  add_targets(model, buffer, parts, morphs, fit_normals(parts, course, skin.turns(), morphs.shapes, morphs.weights), time,
               animation);
   model.animations.push_back(animation);
 }
@@ -377,8 +320,6 @@ void add_animation(tinygltf::Model& model, BufferWriter& buffer, const EmbeddedS
 void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& skin, const retarget::ControlMesh& body,
                        const Eigen::Ref<const Eigen::VectorXd>& mass, const retarget::Motion& motion,
                        const GltfOptions& options) {
-  assert(motion.count() > 0 && motion.frames.rows() == 3 * body.nodes.cols() && mass.size() == body.nodes.cols());
-  assert(skin.embedding.nodes.cols() == skin.vertices.cols());
   constexpr int kMostJoints = std::numeric_limits<unsigned short>::max() + 1;
   if (body.node_count() > kMostJoints) {
     throw Error(path.string(), "control mesh",
@@ -393,7 +334,7 @@ void write_skinned_glb(const std::filesystem::path& path, const EmbeddedSkin& sk
   const std::vector<Appearance::Part> parts = parts_of(skin);
   add_mesh(model, buffer, skin, parts, options);
   add_skeleton(model, buffer, body, options);
-  add_animation(model, buffer, skin, parts, body, mass, with_closing_frame(motion), options);
+  add_animation(model, buffer, PlayedSkin(skin, body, mass, motion), parts, options);
   tinygltf::Scene scene;
   scene.name = options.name;
   scene.nodes = {0, 1};

@@ -4,10 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "io/appearance.h"
-#include "retarget/control_mesh.h"
-#include "retarget/morphs.h"
-#include "retarget/motion.h"
+#include "io/played_skin.h"
 
 namespace hydrostat::io {
 
@@ -15,15 +12,6 @@ struct GltfOptions {
   std::string name = "creature";                    // of the scene's nodes and of the animation
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // [m] of the origin that body and motion are about, in the file's world
   std::array<double, 4> colour{0.80, 0.45, 0.30, 1.0};  // of skin without material: linear red, green, blue, alpha in 0..1
-};
-
-/// A surface that a control mesh carries, as it lies in the bind pose.
-struct EmbeddedSkin {
-  const Eigen::Matrix3Xd& vertices;        // [m] 3 x V
-  const Eigen::Matrix3Xi& triangles;       // 3 x T
-  const retarget::Embedding& embedding;    // of the V vertices in the control mesh
-  const Appearance* appearance = nullptr;  // null, or without parts: one colour, and normals of the smooth surface
-  const retarget::MovingMorphs* morphs = nullptr;  // worn over what the body carries; null, or without targets: nothing
 };
 
 /// Writes a binary glTF 2.0 file in which the fine skin moves with the control nodes: one joint per node, keyed with the

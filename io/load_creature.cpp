@@ -51,12 +51,14 @@ struct NumberRule {
   bool is_whole = false;
   const char* allowed;
 };
+constexpr const char *kExport = "export", *kExportRate = "export-rate";
 constexpr Within kFactor{.least = 0, .most = 1e6, .without_least = true};
 constexpr NumberRule kNumberRules[] = {{"corrector_effort", kFactor, false, "a number above 0 and at most 1e6"},
                                        {"corrector_horizon", kFactor, false, "a number above 0 and at most 1e6"},
                                        {"corrector_root_weight", kFactor, false, "a number above 0 and at most 1e6"},
                                        {"corrector_regulator", {.least = 0, .most = 1e6}, false, "a number from 0 to 1e6"},
                                        {"step_s", {.least = 1e-7, .most = kLongestStep}, false, "a number of seconds from 1e-7 to 1/120"},
+                                       {kExportRate, {.least = kLeastExportRate, .most = kMostExportRate}, false, "a number from 1 to 240"},
                                        {"seed", {.least = 0, .most = kMostSeed}, true, "a whole number from 0 to 4294967295"}};
 
 bool keeps(const NumberRule& rule, const Setting& value) {
@@ -173,6 +175,9 @@ void check_settings(const CreatureRecord& record, const std::string& file) {
         throw setting_error(file, name, value, all);
       }
     }
+    if (const auto* text = std::get_if<std::string>(&value); name == kExport && (text == nullptr || !exports_named(*text))) {
+      throw setting_error(file, name, value, "a list of pc2, mdd and obj, in this order, with commas between,");
+    }
     for (const NumberRule& rule : kNumberRules) {
       if (name == rule.name && !keeps(rule, value)) throw setting_error(file, name, value, rule.allowed);
     }
@@ -220,6 +225,19 @@ void put_feedback(retarget::Feedback feedback, CreatureRecord& record) {
     const auto& [name, number] = numbers[k];
     if (*number != *usual_numbers[k].second) record.settings.emplace_back(name, *number);
   }
+}
+
+Exports exports_of(const CreatureRecord& record) {
+  Exports exports = exports_named(setting(record, kExport, "")).value_or(Exports());
+  exports.rate_hz = setting(record, kExportRate, exports.rate_hz);
+  return exports;
+}
+
+void put_exports(const Exports& exports, CreatureRecord& record) {
+  std::erase_if(record.settings, [](const auto& setting) { return setting.first == kExport || setting.first == kExportRate; });
+  if (!exports.any()) return;
+  record.settings.emplace_back(kExport, export_words(exports));
+  record.settings.emplace_back(kExportRate, exports.rate_hz);
 }
 
 }  // namespace hydrostat::io

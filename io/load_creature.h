@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "io/creature_record.h"
+#include "io/exports.h"
 #include "io/stage_records.h"
 
 namespace hydrostat::io {
@@ -35,5 +36,10 @@ std::string setting(const CreatureRecord& record, const std::string& name, const
 /// The feedback that a creature keeps its way by, and the settings of creature.toml that tell it: none where it is the usual.
 retarget::Feedback feedback_of(const CreatureRecord& record);
 void put_feedback(retarget::Feedback feedback, CreatureRecord& record);
+
+/// What a creature's motion is exported to, and the settings of creature.toml that tell it, in the place of those before: none
+/// where it is to nothing.
+Exports exports_of(const CreatureRecord& record);
+void put_exports(const Exports& exports, CreatureRecord& record);
 
 }  // namespace hydrostat::io

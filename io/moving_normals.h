@@ -23,9 +23,8 @@ struct MovingNormals {
   std::vector<std::vector<Eigen::Matrix3Xd>> of_shapes;  // of each shape x parts
 };
 
-/// Fits at most eight targets to the normals of the moved surface (the mean of the triangles around, weighted by area; drawn
-/// vertices of one place that share a normal in the bind pose go on sharing it): the principal components of their offsets,
-/// as many as it takes to bring these to 2 degrees (RMS). None where the body moves as a whole. A flat part,
+/// Fits at most eight targets to the normals of the moved surface (io/drawn_normals.h): the principal components of their
+/// offsets, as many as it takes to bring these to 2 degrees (RMS). None where the body moves as a whole. A flat part,
 /// whose normals need no help, has 3 x 0 of each. `turns`: of each frame, F. `shapes`, 3 x V each in the bind pose, are what moves the skin by
 /// `shape_weights` (S x F) within the course: each gets normals of its own, and the targets are fitted to the rest.
 /// Source: Alexa and Müller, "Representing Animations by Principal Components", Eurographics 2000.

@@ -53,6 +53,7 @@ void fill(Group& group, const retarget::SourceReport& source) {
   group.add("rate_hz", source.rate_hz);
   group.add("scale", source.scale);
   group.add("root_motion", source.root_motion);
+  if (source.scene_origin_m) group.add("scene_origin_m", Json(*source.scene_origin_m));
 }
 
 void fill(Group& group, const retarget::BodyReport& body) {

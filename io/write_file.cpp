@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "io/writable.h"
@@ -24,18 +25,29 @@ WriteError write_error(const std::filesystem::path& shown_as, int error_number) 
           mend_of_write_error(error_number)};
 }
 
+using Pieces = std::function<std::string_view()>;
+
 /// 0, or the errno of the call that failed.
-int write_and_sync(const std::filesystem::path& file, std::string_view bytes) {
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0) return errno;
-  int failure = 0;
-  while (failure == 0 && !bytes.empty()) {
+int write_piece(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
     if (written >= 0) {
       bytes.remove_prefix(static_cast<std::size_t>(written));
     } else if (errno != EINTR) {
-      failure = errno;
+      return errno;
     }
+  }
+  return 0;
+}
+
+/// Likewise.
+int write_and_sync(const std::filesystem::path& file, const Pieces& next_piece) {
+  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor < 0) return errno;
+  int failure = 0;
+  for (std::string_view piece = next_piece(); failure == 0 && !piece.empty();) {
+    failure = write_piece(descriptor, piece);
+    if (failure == 0) piece = next_piece();
   }
   // A file system may find only now that it has no room left.
   if (failure == 0 && fsync(descriptor) != 0 && errno != EINVAL && errno != ENOTSUP) failure = errno;
@@ -69,20 +81,31 @@ const char* mend_of_write_error(int error_number) {
   }
 }
 
-void write_file(const std::filesystem::path& file, std::string_view bytes, const std::filesystem::path& shown_as) {
+namespace {
+
+void write_pieces(const std::filesystem::path& file, const Pieces& next_piece, const std::filesystem::path& shown_as) {
   std::error_code failed;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), failed);
   if (failed) throw write_error(shown_as, failed.value());
   std::filesystem::path part = file;
   part += ".part";
-  int failure = write_and_sync(part, bytes);
+  int failure = write_and_sync(part, next_piece);
   if (failure == 0 && std::rename(part.c_str(), file.c_str()) != 0) failure = errno;
   if (failure == 0) return;
   std::filesystem::remove(part, failed);
   throw write_error(shown_as, failure);
 }
 
+}  // namespace
+
+void write_file(const std::filesystem::path& file, std::string_view bytes, const std::filesystem::path& shown_as) {
+  const auto whole = [&] { return std::exchange(bytes, {}); };
+  write_pieces(file, whole, shown_as);
+}
+
 void write_file(const std::filesystem::path& file, std::string_view bytes) { write_file(file, bytes, file); }
+
+void write_file(const std::filesystem::path& file, const Pieces& next_piece) { write_pieces(file, next_piece, file); }
 
 void refuse_unwritable(const std::filesystem::path& directory) {
   std::error_code failed;

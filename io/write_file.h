@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -11,6 +12,9 @@ namespace hydrostat::io {
 /// leaves no part.
 void write_file(const std::filesystem::path& file, std::string_view bytes, const std::filesystem::path& shown_as);
 void write_file(const std::filesystem::path& file, std::string_view bytes);
+/// The same of bytes that `next_piece` hands over one after the other, until a piece is empty: a large file need not lie in
+/// memory as a whole.
+void write_file(const std::filesystem::path& file, const std::function<std::string_view()>& next_piece);
 
 /// All bytes of a file. Throws Error when it cannot be read.
 std::string read_file(const std::filesystem::path& file);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@ namespace hydrostat::retarget {
 struct SourceReport {
   std::string file, sha256, clip, root_motion;
   double duration_s = 0, rate_hz = 0, scale = 1;
+  std::optional<std::array<double, 3>> scene_origin_m = {};  // of a creature: where its scene's places count from, in its motion
 };
 
 struct BodyReport {

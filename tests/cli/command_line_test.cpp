@@ -28,6 +28,28 @@ TEST(CommandLine, IsTheReadmesSubject) {
   }
 }
 
+TEST(CommandLine, VerbsOfSignalsStandInTheReadmeWithTheirOptions) {
+  const std::string readme = io::read_file(HYDROSTAT_README);
+  int exit_code = 0, seen = 0;
+  const std::shared_ptr<CLI::App> app = command_line(exit_code);
+  for (const CLI::App* verb : app->get_subcommand("signals")->get_subcommands([](const CLI::App*) { return true; })) {
+    if (verb->get_name().empty()) continue;  // a group of options
+    ++seen;
+    const std::size_t begin = readme.find("\nhydrostat signals DIR " + verb->get_name());
+    ASSERT_NE(begin, std::string::npos) << verb->get_name();
+    const std::string line = readme.substr(begin + 1, readme.find('\n', begin + 1) - begin);
+    std::vector<const CLI::Option*> options = verb->get_options();
+    for (const CLI::App* group : verb->get_subcommands([](const CLI::App* some) { return some->get_name().empty(); })) {
+      for (const CLI::Option* option : group->get_options()) options.push_back(option);
+    }
+    for (const CLI::Option* option : options) {
+      if (option->get_lnames().empty() || option->get_lnames().front() == "help") continue;
+      EXPECT_NE(line.find("--" + option->get_lnames().front()), std::string::npos) << option->get_lnames().front() << " of " << line;
+    }
+  }
+  EXPECT_EQ(seen, 8);
+}
+
 /// Choices are those of a type name such as TEXT:{tet,hex}.
 TEST(CommandLine, HelpThatNamesTwoChoicesNamesAll) {
   int exit_code = 0, seen = 0;

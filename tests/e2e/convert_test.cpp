@@ -316,6 +316,30 @@ TEST(Convert, KeepsTheLayersOfASignalFile) {
   EXPECT_NE(hydrostat_in(directory.path, "signals creature layers").out.find("'softer'"), std::string::npos);
 }
 
+/// Those of a file that was worked on stay, with a warning; another clip goes without.
+TEST(Convert, KeepsTheLayersOfTheSameClipAlone) {
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "creature";
+  const auto warnings_of = [&](const std::string& clip) {
+    hydrostat_in(directory.path, "convert " + clip + " -o creature --quiet " + kSmallOptions);
+    return report_of(creature)["warnings"].dump();
+  };
+  const auto layers = [&] { return hydrostat_in(directory.path, "signals creature layers").out; };
+  const std::string trot = io::read_file(fs::path(HYDROSTAT_SAMPLES) / kSmallClip);
+  io::write_file(directory.path / "clip.fbx", trot);
+  warnings_of("clip.fbx");
+  hydrostat_in(directory.path, "signals creature gain --factor 1 --name softer");
+  EXPECT_EQ(warnings_of("clip.fbx").find("layers: "), std::string::npos);
+  EXPECT_NE(layers().find("'softer'"), std::string::npos);
+  io::write_file(directory.path / "clip.fbx", trot + " ");
+  EXPECT_NE(warnings_of("./clip.fbx").find("layers: ./clip.fbx has changed since the signals were edited"), std::string::npos);
+  EXPECT_NE(layers().find("'softer'"), std::string::npos);
+  io::write_file(directory.path / "other.fbx", trot + "  ");
+  EXPECT_NE(warnings_of("other.fbx").find("layers: the signals' edits (1) were left out, for they are of the clip 'Scene' of "), std::string::npos);
+  EXPECT_EQ(layers().find("'softer'"), std::string::npos);
+  EXPECT_EQ(warnings_of("clip.fbx").find("layers: "), std::string::npos);  // none are left
+}
+
 TEST(Convert, LetsAnotherBodyGoForEachSeed) {
   const TemporaryDirectory directory;
   const auto made = [&](const std::string& seed) {

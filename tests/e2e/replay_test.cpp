@@ -260,6 +260,54 @@ TEST_F(Replay, GoesInTheSceneThatTheCreatureWasMadeWith) {
   EXPECT_FALSE(fs::exists(creature_ / "scene.toml"));
 }
 
+/// The farthest that a place where contact is tested gets along z [m].
+double farthest_along_z(const fs::path& trace, const fs::path& creature) {
+  const auto position = io::read_npy_double(trace / "position.npy");
+  const nlohmann::json points = nlohmann::json::parse(io::read_file(creature / "body.json")).at("contact_points");
+  const std::vector<std::vector<int>> nodes = points.at("nodes");
+  const std::vector<std::vector<double>> weights = points.at("weights");
+  double farthest = -1e300;
+  for (std::size_t s = 0; s < position.shape[0]; ++s) {
+    const Eigen::Matrix3Xd x = audit::points(position, s);
+    for (std::size_t p = 0; p < nodes.size(); ++p) {
+      double z = 0;
+      for (std::size_t k = 0; k < nodes[p].size(); ++k) z += weights[p][k] * x(2, nodes[p][k]);
+      farthest = std::max(farthest, z);
+    }
+  }
+  return farthest;
+}
+
+/// The trot walks toward +z, and into a wall that is told in the scene's places.
+TEST_F(Replay, TellsInTheReportWhereThePlacesOfASceneCountFrom) {
+  const std::string wall = "[[obstacle]]\nshape = \"box\"\nsize_m = [4.0, 4.0, 1.0]\nposition_m = [0.0, 0.5, 1.4]\n";
+  const nlohmann::json flat = report_of(creature_)["source"]["scene_origin_m"];
+  EXPECT_EQ(flat.at(1), 0);
+  EXPECT_GT(std::abs(flat.at(2).get<double>()), 0.02);  // else it shows nothing
+  for (const std::string ground : {"", "[ground]\nslope_deg = 6.0\nslope_heading_deg = -90.0\n"}) {
+    SCOPED_TRACE(ground);
+    io::write_file(directory_.path / "world.toml", wall + ground);
+    replay("--duration 2 --trace trace --scene world.toml");
+    const nlohmann::json origin = report_of(creature_)["source"]["scene_origin_m"];
+    EXPECT_EQ(origin, flat);
+    EXPECT_NEAR(farthest_along_z(directory_.path / "trace", creature_), origin.at(2).get<double>() + 0.9, 1e-3);
+  }
+}
+
+TEST_F(Replay, LeavesTheCreaturesOwnMotionToTheReportThatTellsOfIt) {
+  const std::string before = motion_bytes(creature_);
+  fs::create_directory_symlink(creature_, directory_.path / "link");
+  fs::create_symlink(creature_ / "replay.glb", directory_.path / "motion.glb");
+  for (const char* out : {"creature/replay.glb", "creature/./replay.glb", "link/replay.glb", "motion.glb", "creature/reference.glb", "creature/failed.glb"}) {
+    const Outcome outcome = replay("--duration 0.1 -o " + std::string(out));
+    EXPECT_EQ(outcome.exit_code, 2) << out;
+    EXPECT_NE(outcome.err.find("Leave --out out to have replay.glb and the report anew"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(motion_bytes(creature_), before);
+  EXPECT_EQ(hydrostat_in(directory_.path, "replay link --quiet --duration 0.1 -o creature/replay.glb").exit_code, 2);
+  EXPECT_EQ(replay("--duration 0.1 -o creature/mine.glb").exit_code, 0);
+}
+
 TEST_F(Replay, PutsAFallIntoFailedGlb) {
   const std::string blow = "--push t=0.3,dv=20:0:0";
   const Outcome aside = replay("-o motion.glb " + blow);

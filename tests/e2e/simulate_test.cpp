@@ -139,6 +139,24 @@ TEST(Simulate, SwingingBarTearsAndItsLowerPartComesToLie) {
   EXPECT_LT(audit::points(position, position.shape.at(0) - 1).row(1).minCoeff(), 0.01);  // it lies on the ground
 }
 
+/// A flattened square that spins: backward Euler brings it back into shape, and loses angular momentum by it.
+TEST(Simulate, WarnsOfABodyThatTheGuardTurnedInTheAir) {
+  const TemporaryDirectory directory;
+  io::write_file(directory.path / "scene.toml",
+                 "dimension = 2\nduration_s = 0.3\ngravity_m_s2 = [0.0, 0.0]\n[body]\nshape = \"square\"\nsize_m = 0.4\nnodes = 30\n"
+                 "start = \"flattened\"\nspin_deg_s = 3000.0\n[material]\nyoungs_modulus_pa = 2e4\n");
+  const Outcome outcome = simulate(directory.path, "scene.toml");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("; assisted from outside by up to "), std::string::npos) << outcome.out;
+  const nlohmann::json report = report_of(directory.path / "out");
+  EXPECT_GT(report.at("simulation").at("external_assist_mg"), 0.01);
+  EXPECT_NE(report.at("warnings").dump().find("assist: the body is not moved by its scene alone"), std::string::npos) << report.at("warnings");
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(hydrostat_in(directory.path, "simulate scene.toml -o out").err.find("\nwarning: assist: "), std::string::npos);
+  ASSERT_EQ(simulate(directory.path, scene_of("random_start"), "--duration 0.2").exit_code, 0);  // by rounding alone
+  EXPECT_EQ(report_of(directory.path / "out").at("warnings").dump().find("assist: "), std::string::npos);
+}
+
 TEST(Simulate, BallRecoversFromRandomPlaces) {
   const TemporaryDirectory directory;
   for (const std::string seed : {"1", "2"}) {

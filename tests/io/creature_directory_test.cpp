@@ -59,7 +59,7 @@ TEST(CreatureWriter, KeepsTheCacheAndTheUsersFilesAndNoOldResults) {
   write_file(creature / "cache" / "body-1.bin", "cached");
   write_file(creature / "notes" / "mine.txt", "my notes");
   const char* const old_results[] = {"replay.glb", "scene.toml", "appearance.bin", "morphs.bin", "path.bin", "wobble.bin", "rig.bin",
-                                     "accuracy.csv"};
+                                     "accuracy.csv", "replay.pc2", "replay.mdd", "replay.obj", "replay.mtl", "replay_obj/replay_0001.obj"};
   for (const char* name : old_results) write_file(creature / name, "old");
   {
     CreatureWriter writer(creature, Start::afresh);

@@ -122,11 +122,32 @@ TEST(CreatureRecord, SettingsThatACreatureCannotGoByAreRefused) {
   EXPECT_NE(told("step_s", std::numeric_limits<double>::quiet_NaN()).find("is nan, where"), std::string::npos);
   EXPECT_NE(told("seed", 1.5).find("is 1.5, where a whole number"), std::string::npos);
   EXPECT_NE(told("wobble", std::int64_t{1}).find("is 1, where one of auto, on, off"), std::string::npos);
+  for (const char* words : {"", "glb", "pc2,glb", "mdd,pc2", "pc2,pc2", "pc2, mdd", "pc2,"}) {
+    EXPECT_NE(told("export", std::string(words)).find("where a list of pc2, mdd and obj, in this order"), std::string::npos) << words;
+  }
+  EXPECT_NE(told("export", true).find("is true, where a list"), std::string::npos);
+  EXPECT_NE(told("export-rate", 0.5).find("is 0.5, where a number from 1 to 240 belongs"), std::string::npos);
   EXPECT_NE(told("calibrated", "yes").find("is 'yes', where true or false"), std::string::npos);
 
   CreatureRecord sound = example();
-  sound.settings = {{"method", std::string("xpbd")}, {"corrector_effort", std::int64_t{4}}, {"step_s", 1.0 / 120}, {"seed", std::int64_t{0}}, {"limit", std::string("auto")}};
+  sound.settings = {{"method", std::string("xpbd")}, {"corrector_effort", std::int64_t{4}}, {"step_s", 1.0 / 120}, {"seed", std::int64_t{0}}, {"limit", std::string("auto")},
+                    {"export", std::string("pc2,obj")}, {"export-rate", std::int64_t{24}}};
   check_settings(sound, "trot/creature.toml");
+}
+
+TEST(CreatureRecord, GivesExportsBackAndTellsNothingOfNone) {
+  CreatureRecord record = example();
+  const auto before = record.settings;
+  EXPECT_EQ(exports_of(record), Exports());
+  put_exports({.rate_hz = 30}, record);
+  EXPECT_EQ(record.settings, before);
+  for (const Exports& exports : {Exports{.pc2 = true}, Exports{.mdd = true, .obj = true, .rate_hz = 29.97}, Exports{true, true, true, 240}}) {
+    put_exports(exports, record);
+    EXPECT_EQ(record.settings.size(), before.size() + 2) << "in the place of those before";
+    EXPECT_EQ(exports_of(record), exports);
+  }
+  put_exports({}, record);
+  EXPECT_EQ(record.settings, before);
 }
 
 TEST(CreatureRecord, RefusesADirectoryWithoutOne) {

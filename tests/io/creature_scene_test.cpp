@@ -76,6 +76,8 @@ delta_v_m_s = [0.0, 0.3, 0.0]
   const retarget::World& world = performer.world;
   const Vector3d com = physics::centre_of_mass(performer.scene.body, performer.prepared.target.at(0));
   EXPECT_LT((world.pivot - Vector3d(com.x(), 0, com.z())).norm(), 1e-12);
+  EXPECT_EQ(scene_origin(plain), world.pivot);
+  EXPECT_EQ(scene_origin(performer), world.pivot);
   const Vector3d place = world.turn * (performer.scene.obstacles[0].place - world.pivot);
   EXPECT_LT((place - Vector3d(4, 1.5, 0.5)).norm(), 1e-12);
   EXPECT_LT((world.turn * world.moves[0].velocity - Vector3d(1, 0, 0)).norm(), 1e-12);

@@ -5,139 +5,24 @@
 
 #include <Eigen/Geometry>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
-#include <random>
 
 #include "io/read_scene.h"
 #include "retarget/error.h"
+#include "tests/io/moving_creature.h"
+#include "tests/io/played_glb.h"
 
 namespace hydrostat::io::gltf_out_test {
 namespace {
 
+using namespace moving_creature;
+using namespace played_glb;
+
 namespace fs = std::filesystem;
-
-/// A body of random tets over a cloud of nodes, points inside of them, and nodes that turn, travel and wobble.
-struct Creature {
-  retarget::ControlMesh body;
-  Eigen::VectorXd mass;
-  Eigen::Matrix3Xd vertices;
-  Eigen::Matrix3Xi triangles;
-  retarget::Embedding embedding;
-  retarget::Motion motion;
-};
-
-Creature random_creature(unsigned seed, int nodes, int vertices, int frames) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<> uniform(0, 1);
-  Creature creature;
-  creature.body.nodes = Eigen::Matrix3Xd::NullaryExpr(3, nodes, [&] { return uniform(random); });
-  creature.mass = Eigen::VectorXd::NullaryExpr(nodes, [&] { return 0.1 + uniform(random); });
-  creature.vertices.resize(3, vertices);
-  creature.embedding.nodes.resize(4, vertices);
-  creature.embedding.weights.resize(4, vertices);
-  for (int v = 0; v < vertices; ++v) {
-    const int first = static_cast<int>(random() % static_cast<unsigned>(nodes));
-    for (int k = 0; k < 4; ++k) {
-      creature.embedding.nodes(k, v) = (first + k) % nodes;
-      creature.embedding.weights(k, v) = v % 5 == 0 && k > 0 ? 0 : uniform(random);  // some vertices lie on a node
-    }
-    creature.embedding.weights.col(v) /= creature.embedding.weights.col(v).sum();
-    creature.vertices.col(v).setZero();
-    for (int k = 0; k < 4; ++k) {
-      creature.vertices.col(v) += creature.embedding.weights(k, v) * creature.body.nodes.col(creature.embedding.nodes(k, v));
-    }
-  }
-  creature.triangles.resize(3, vertices - 2);
-  for (int t = 0; t < vertices - 2; ++t) creature.triangles.col(t) << t, t + 1, t + 2;
-  creature.motion.rate_hz = 30;
-  creature.motion.frames.resize(3 * nodes, frames);
-  for (int f = 0; f < frames; ++f) {
-    const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7 * f, Eigen::Vector3d(0.2, 1, 0.1).normalized()).toRotationMatrix();
-    const Eigen::Matrix3Xd wobble = Eigen::Matrix3Xd::NullaryExpr(3, nodes, [&] { return 0.05 * uniform(random); });
-    creature.motion.at(f) = (turn * (creature.body.nodes + wobble)).colwise() + Eigen::Vector3d(0.1 * f, 0, 0);
-  }
-  return creature;
-}
-
-Eigen::Matrix3Xd embedded(const Creature& creature, const Eigen::Matrix3Xd& nodes) {
-  Eigen::Matrix3Xd positions = Eigen::Matrix3Xd::Zero(3, creature.vertices.cols());
-  for (Eigen::Index v = 0; v < positions.cols(); ++v) {
-    for (int k = 0; k < 4; ++k)
-      positions.col(v) += creature.embedding.weights(k, v) * nodes.col(creature.embedding.nodes(k, v));
-  }
-  return positions;
-}
 
 void write(const fs::path& path, const Creature& creature) {
   write_skinned_glb(path, {creature.vertices, creature.triangles, creature.embedding}, creature.body, creature.mass,
                     creature.motion, {});
-}
-
-tinygltf::Model load(const fs::path& path) {
-  tinygltf::Model model;
-  tinygltf::TinyGLTF loader;
-  std::string error, warning;
-  EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path.string())) << error;
-  EXPECT_EQ(warning, "");
-  return model;
-}
-
-template <typename Number>
-std::vector<Number> values(const tinygltf::Model& model, int index) {
-  const tinygltf::Accessor& accessor = model.accessors.at(static_cast<std::size_t>(index));
-  const tinygltf::BufferView& view = model.bufferViews.at(static_cast<std::size_t>(accessor.bufferView));
-  const auto components = static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)));
-  std::vector<Number> result(accessor.count * components);
-  std::memcpy(result.data(), model.buffers[0].data.data() + view.byteOffset + accessor.byteOffset,
-              result.size() * sizeof(Number));
-  return result;
-}
-
-/// Linear blend skinning as an engine does it, from what the file says, between key `key` and the next at `share` of the
-/// way.
-Eigen::Matrix3Xd play(const tinygltf::Model& model, std::size_t key, double share = 0) {
-  const tinygltf::Primitive& primitive = model.meshes[0].primitives[0];
-  std::vector<float> positions = values<float>(model, primitive.attributes.at("POSITION"));
-  const std::vector<unsigned short> joints = values<unsigned short>(model, primitive.attributes.at("JOINTS_0"));
-  const std::vector<float> weights = values<float>(model, primitive.attributes.at("WEIGHTS_0"));
-  const std::vector<float> inverse_binds = values<float>(model, model.skins[0].inverseBindMatrices);
-  std::vector<Eigen::Affine3d> pose(model.skins[0].joints.size());
-  const tinygltf::Animation& animation = model.animations.at(0);
-  for (const tinygltf::AnimationChannel& channel : animation.channels) {
-    const std::vector<float> keys =
-        values<float>(model, animation.samplers[static_cast<std::size_t>(channel.sampler)].output);
-    const auto joint = static_cast<std::size_t>(channel.target_node - model.skins[0].joints[0]);
-    const std::size_t next = share > 0 ? key + 1 : key;
-    if (channel.target_path == "weights") {
-      for (std::size_t k = 0, targets = primitive.targets.size(); k < targets; ++k) {
-        const auto weight = static_cast<float>((1 - share) * keys[targets * key + k] + share * keys[targets * next + k]);
-        const std::vector<float> offsets = values<float>(model, primitive.targets[k].at("POSITION"));
-        for (std::size_t i = 0; i < offsets.size(); ++i) positions[i] += weight * offsets[i];
-      }
-      continue;
-    }
-    if (channel.target_path == "translation") {
-      const Eigen::Vector3d here = Eigen::Map<const Eigen::Vector3f>(&keys[3 * key]).cast<double>();
-      const Eigen::Vector3d there = Eigen::Map<const Eigen::Vector3f>(&keys[3 * next]).cast<double>();
-      pose[joint].translation() = here + share * (there - here);
-    } else {
-      const Eigen::Quaterniond here = Eigen::Map<const Eigen::Quaternionf>(&keys[4 * key]).cast<double>();
-      const Eigen::Quaterniond there = Eigen::Map<const Eigen::Quaternionf>(&keys[4 * next]).cast<double>();
-      pose[joint].linear() = here.slerp(share, there).toRotationMatrix();
-    }
-  }
-  Eigen::Matrix3Xd played = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(positions.size() / 3));
-  for (std::size_t v = 0; v < positions.size() / 3; ++v) {
-    const Eigen::Vector3d bind = Eigen::Map<const Eigen::Vector3f>(&positions[3 * v]).cast<double>();
-    for (std::size_t k = 0; k < 4; ++k) {
-      const std::size_t joint = joints[4 * v + k];
-      const Eigen::Matrix4d inverse_bind = Eigen::Map<const Eigen::Matrix4f>(&inverse_binds[16 * joint]).cast<double>();
-      played.col(static_cast<Eigen::Index>(v)) +=
-          double{weights[4 * v + k]} * (pose[joint] * (inverse_bind * bind.homogeneous()).head<3>());
-    }
-  }
-  return played;
 }
 
 fs::path scratch(const std::string& name) { return fs::path(testing::TempDir()) / ("hydrostat_" + name + ".glb"); }
@@ -181,58 +66,6 @@ TEST(WriteSkinnedGlb, AllJointsTurnAsTheBodyDoesAndTheirKeysTakeTheShortWay) {
       }
     }
   }
-}
-
-/// A bar along x of square section whose nodes are its skin's vertices; `bend`: by how much [rad] its ends are turned to
-/// each other.
-Eigen::Matrix3Xd bent_bar(double bend) {
-  constexpr int kSections = 9;
-  Eigen::Matrix3Xd nodes(3, 4 * kSections);
-  for (int n = 0; n < nodes.cols(); ++n) {
-    const double along = n / 4 / (kSections - 1.0) - 0.5, up = 0.1 * (n / 2 % 2) - 0.05, aside = 0.1 * (n % 2) - 0.05;
-    const double angle = bend * along, radius = std::abs(bend) > 1e-9 ? 1 / bend : 0;
-    nodes.col(n) = radius == 0
-                       ? Eigen::Vector3d(along, up, aside)
-                       : Eigen::Vector3d((radius + up) * std::sin(angle), (radius + up) * std::cos(angle) - radius, aside);
-  }
-  return nodes;
-}
-
-Creature bar(const std::vector<double>& bends) {
-  Creature creature;
-  creature.body.nodes = creature.vertices = bent_bar(0);
-  const Eigen::Index count = creature.vertices.cols();
-  creature.mass = Eigen::VectorXd::Ones(count);
-  creature.embedding.nodes = Eigen::Matrix4Xi::Zero(4, count);
-  creature.embedding.nodes.row(0) = Eigen::RowVectorXi::LinSpaced(count, 0, static_cast<int>(count) - 1);
-  creature.embedding.weights = Eigen::Matrix4Xd::Zero(4, count);
-  creature.embedding.weights.row(0).setOnes();
-  std::vector<int> corners;
-  const int ring[] = {0, 1, 3, 2, 0};
-  for (int n = 0; n + 4 < count; n += 4) {
-    for (int k = 0; k < 4; ++k) {
-      const int a = n + ring[k], b = n + ring[k + 1];
-      corners.insert(corners.end(), {a, b, a + 4, b, b + 4, a + 4});
-    }
-  }
-  creature.triangles = Eigen::Map<const Eigen::Matrix3Xi>(corners.data(), 3, static_cast<Eigen::Index>(corners.size()) / 3);
-  creature.motion.rate_hz = 30;
-  creature.motion.frames.resize(3 * count, static_cast<Eigen::Index>(bends.size()));
-  for (std::size_t f = 0; f < bends.size(); ++f) {
-    const Eigen::AngleAxisd turn(0.3 * static_cast<double>(f), Eigen::Vector3d::UnitY());
-    creature.motion.at(static_cast<Eigen::Index>(f)) = turn.toRotationMatrix() * bent_bar(bends[f]);
-  }
-  return creature;
-}
-
-Eigen::Matrix3Xd surface_normals(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix3Xi& triangles) {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, vertices.cols());
-  for (const auto corners : triangles.colwise()) {
-    const Eigen::Vector3d a = vertices.col(corners[0]);
-    for (const int corner : corners)
-      normals.col(corner) += (vertices.col(corners[1]) - a).cross(vertices.col(corners[2]) - a);
-  }
-  return normals.colwise().normalized();
 }
 
 /// Angle [rad, RMS over the vertices] between the normals that an engine shows in a frame and those of the moved surface.
@@ -302,38 +135,16 @@ TEST(WriteSkinnedGlb, NormalsOfARigidBodyNeedNoHelp) {
   EXPECT_TRUE(load(scratch("rigid")).meshes[0].primitives[0].targets.empty());
 }
 
-/// The bar with edges, and a face: its last section swells by a centimetre or two, away from the bar.
-struct Face {
-  Creature creature;
-  retarget::MovingMorphs morphs;
-
-  explicit Face(const std::vector<double>& bends) : creature(bar(bends)) {
-    std::vector<int> edges;
-    const auto count = static_cast<int>(creature.vertices.cols());
-    for (int a = 0; a < count; ++a) {
-      for (int b = a + 1; b < count && b / 4 <= a / 4 + 1; ++b) edges.insert(edges.end(), {a, b});
-    }
-    creature.body.edges =
-        Eigen::Map<const Eigen::Matrix2Xi>(edges.data(), 2, static_cast<Eigen::Index>(edges.size() / 2));
-    const Eigen::VectorXi last = Eigen::VectorXi::LinSpaced(4, count - 4, count - 1);
-    morphs.targets = {{"pout", last, Eigen::Vector3d(0.02, 0, 0).replicate(1, 4)},
-                      {"brow", last.head(2), Eigen::Vector3d(0, 0.01, 0.01).replicate(1, 2)}};
-    const auto frames = static_cast<Eigen::Index>(bends.size());
-    morphs.rate_hz = creature.motion.rate_hz;
-    morphs.weights.resize(2, frames);
-    for (Eigen::Index f = 0; f < frames; ++f) morphs.weights.col(f) << 0.3 + 0.1 * static_cast<double>(f % 5), f % 2;
-  }
-
-  void write_to(const fs::path& path) const {
-    write_skinned_glb(path, {creature.vertices, creature.triangles, creature.embedding, nullptr, &morphs}, creature.body,
-                      creature.mass, creature.motion, {});
-  }
-};
+void write(const fs::path& path, const Face& face) {
+  const Creature& creature = face.creature;
+  write_skinned_glb(path, {creature.vertices, creature.triangles, creature.embedding, nullptr, &face.morphs}, creature.body,
+                    creature.mass, creature.motion, {});
+}
 
 TEST(WriteSkinnedGlb, MorphTargetsAreWornByNameAndTurnWithTheBodyAroundThem) {
   const std::vector<double> bends{0, 0.5, 1, 1.5, 2, 1, -0.5, -1.5};
   const Face face(bends);
-  face.write_to(scratch("face"));
+  write(scratch("face"), face);
   const tinygltf::Model model = load(scratch("face"));
   const tinygltf::Value names = model.meshes[0].extras.Get("targetNames");
   ASSERT_EQ(names.ArrayLen(), model.meshes[0].primitives[0].targets.size());
@@ -365,7 +176,7 @@ TEST(WriteSkinnedGlb, MorphTargetsOfALoopKeepItsPhaseForEver) {
   Face face({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
   face.morphs.loop = true;
   face.morphs.weights.conservativeResize(Eigen::NoChange, 5);  // 5 frames a period, 13 of the motion
-  face.write_to(scratch("phase"));
+  write(scratch("phase"), face);
   const tinygltf::Model model = load(scratch("phase"));
   const Eigen::Index corner = face.creature.vertices.cols() - 1;
   for (std::size_t f = 0; f < 13; ++f) {
@@ -412,7 +223,7 @@ TEST(WriteSkinnedGlb, KhronosValidatorFindsNothing) {
   creature.motion.loop = true;
   write(scratch("valid"), creature);
   write(scratch("valid_bent"), bar({0, 1, 2}));
-  Face({0, 1, 2}).write_to(scratch("valid_face"));
+  write(scratch("valid_face"), Face({0, 1, 2}));
   const std::string command = "NODE_PATH='" HYDROSTAT_NODE_MODULES "' node '" HYDROSTAT_TESTS "/io/validate_glb.cjs' '" +
                               scratch("valid").string() + "' '" + scratch("valid_bent").string() + "' '" +
                               scratch("valid_face").string() + "'";

@@ -28,6 +28,13 @@ retarget::RunReport full_report() {
   return report;
 }
 
+TEST(ReportJson, TellsOfACreatureWhereAScenesPlacesCountFrom) {
+  retarget::RunReport report = full_report();
+  EXPECT_FALSE(Json::parse(report_json(report)).at("source").contains("scene_origin_m"));
+  report.source.scene_origin_m = {0.25, 0, -1};
+  EXPECT_EQ(Json::parse(report_json(report)).at("source").at("scene_origin_m"), Json({0.25, 0.0, -1.0}));
+}
+
 TEST(ReportJson, HasEveryGroupAndNameOfTheContract) {
   const Json json = Json::parse(report_json(full_report()));
   EXPECT_EQ(json.at("schema"), "hydrostat.report/1");

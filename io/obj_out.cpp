@@ -1,6 +1,7 @@
 #include "io/obj_out.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <map>
 #include <set>
@@ -58,6 +59,15 @@ Eigen::Matrix2Xd places_of(const Appearance::Part& part, const std::vector<Mater
 std::string number_of(Eigen::Index frame, std::size_t digits) {
   const std::string number = std::to_string(frame + 1);
   return std::string(digits - std::min(digits, number.size()), '0') + number;
+}
+
+/// Whether write_obj_frames wrote it.
+bool is_of_frames(const std::string& file, const std::string& name) {
+  if (file == name + ".mtl") return true;
+  const std::string begin = name + "_", end = ".obj";
+  if (!file.starts_with(begin) || !file.ends_with(end) || file.size() < begin.size() + end.size() + kLeastDigits) return false;
+  return std::all_of(file.begin() + static_cast<std::ptrdiff_t>(begin.size()), file.end() - static_cast<std::ptrdiff_t>(end.size()),
+                     [](unsigned char letter) { return std::isdigit(letter) != 0; });
 }
 
 WriteError directory_error(const fs::path& directory, const std::error_code& failure) {
@@ -156,8 +166,10 @@ void refuse_obj_frames(const fs::path& directory, const std::string& name) {
   if (!fs::is_directory(directory, ignored)) {
     throw Error(directory.string(), "--export obj", "is a file where a directory belongs", "Move the file away.");
   }
-  if (!fs::is_empty(directory, ignored) && !fs::exists(directory / (name + ".mtl"), ignored)) {
-    throw Error(directory.string(), "--export obj", "holds something else than frames", "Move the directory away.");
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory, ignored)) {
+    if (is_of_frames(entry.path().filename().string(), name)) continue;
+    throw Error(directory.string(), "--export obj", "holds '" + entry.path().filename().string() + "', which is none of its frames",
+                "Move it away, for the directory is replaced as a whole.");
   }
   refuse_unwritable(directory.parent_path());
 }

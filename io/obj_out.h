@@ -50,7 +50,7 @@ class ObjSkin {
 void write_obj_frames(const std::filesystem::path& directory, const std::string& name, Eigen::Index frames,
                       const std::function<std::string(Eigen::Index)>& text_at, const std::string& material_text);
 
-/// Throws Error where write_obj_frames may not replace or cannot make the directory: it holds other things, or is a file.
+/// Throws Error where write_obj_frames may not replace or cannot make the directory: it holds anything but its frames, or is a file.
 void refuse_obj_frames(const std::filesystem::path& directory, const std::string& name);
 
 }  // namespace hydrostat::io

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "io/rig_skin.h"
 #include "retarget/error.h"
@@ -50,13 +51,28 @@ void add_capsule(retarget::SkinnedMesh& skin, const Eigen::Vector3d& a, const Ei
   for (int i = 0; i < count; ++i) skin.skin_weights.push_back({{bone, 1}});
 }
 
+/// The joints that bones run from or to; what hangs on none and bears none is a camera, a light or a mark.
+std::vector<int> jointed(const retarget::Skeleton& skeleton) {
+  std::vector<bool> is_jointed(static_cast<std::size_t>(skeleton.count()), false);
+  for (std::size_t child = 0; child < is_jointed.size(); ++child) {
+    const int bone = skeleton.parents[child];
+    if (bone >= 0) is_jointed[child] = is_jointed[static_cast<std::size_t>(bone)] = true;
+  }
+  std::vector<int> result;
+  for (int j = 0; j < skeleton.count(); ++j) {
+    if (is_jointed[static_cast<std::size_t>(j)]) result.push_back(j);
+  }
+  return result;
+}
+
 }  // namespace
 
 void add_capsules(Rig& rig, const std::string& path) {
   retarget::Skeleton& skeleton = rig.skeleton;
   Eigen::Matrix3Xd joints(3, skeleton.count());
   for (int j = 0; j < skeleton.count(); ++j) joints.col(j) = skeleton.bind_pose[static_cast<std::size_t>(j)].translation();
-  const double extent = extent_of(joints);
+  const std::vector<int> bony = jointed(skeleton);
+  const double extent = bony.empty() ? 0 : extent_of(joints(Eigen::all, bony));
   int capsules = 0;
   for (int child = 0; child < skeleton.count(); ++child) {
     const int bone = skeleton.parents[static_cast<std::size_t>(child)];

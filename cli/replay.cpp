@@ -303,107 +303,158 @@ void refuse_own_motion(const ReplayCommand& command) {
   }
 }
 
+/// Refuses places in which nothing can be written, before anything is simulated.
+void refuse_places(const ReplayCommand& command, const io::Exports& exports) {
+  if (!command.out.empty()) io::refuse_unwritable_file(command.out);
+  if (!command.out.empty()) io::refuse_exports(command.out, exports);
+  if (!command.trace.empty()) io::refuse_trace(command.trace);
+}
+
+/// A creature let go again as a command asks for; its stages, in the order of run().
+class CreatureReplay {
+ public:
+  CreatureReplay(const ReplayCommand& command, int every)
+      : command_(command), every_(every), progress_(std::cerr, progress_style(command.quiet)), stages_(progress_) {}
+
+  int run() {
+    creature_ = stages_.run("load", [&] { return io::load_creature(command_.directory); });
+    const std::vector<std::string> of_conversion = warnings();  // which told them
+    options_ = perform_options(command_, creature_);
+    const WobbleChoice wobble(command_.wobble, command_.level.is_asked(), command_.directory, creature_);
+    check_scene(command_, creature_);
+    exports_ = exports_of(command_, creature_.record);
+    refuse_places(command_, exports_);
+    Levels levels(command_, creature_, options_, stages_);
+    wobble.plan(performer());
+    if (command_.accuracy.is_asked()) choose_steps();
+    put_in_scene(command_, creature_);  // levels and accuracy are of the flat ground
+    options_ = in_its_world(options_, performer());
+    std::optional<io::CreatureWriter> writer;
+    if (command_.out.empty()) writer.emplace(command_.directory, io::CreatureWriter::Start::amended);
+
+    perform();
+    while (levels.take_better(way_kept(main()), creature_)) {
+      wobble.plan(performer());
+      put_in_scene(command_, creature_);
+      perform();
+    }
+    take_finer_steps();
+    if (is_down(main())) way_up_ = levels.way_up(creature_);
+    if (is_down(main()) && way_up_.empty()) way_up_ = usual_way_up(command_, main());
+    add_warnings();
+    options_.feedback = performances_.feedback;
+    if (!command_.json) tell_level(creature_.target.report, command_.directory);
+    note_warnings(progress_, beyond(of_conversion, warnings()), "level: ");
+    return writer ? renew(*writer) : write_alone();
+  }
+
+ private:
+  retarget::Performer& performer() { return creature_.target.performer; }
+  const retarget::Replay& main() const { return performances_.main(); }
+  std::vector<std::string>& warnings() { return creature_.target.report.warnings; }
+
+  /// The cheapest that keep the error asked for.
+  void choose_steps() {
+    chosen_ = stages_.run("accuracy", [&] { return choose_step(command_.accuracy, kCommand, performer(), creature_.signals, std::nullopt); });
+    take_steps(options_.replay, chosen_->setting);
+  }
+
+  void perform() {
+    performances_ = stages_.run("replay", [&] {
+      if (!command_.level.is_asked()) return retarget::perform(performer(), creature_.signals, options_);
+      return retarget::perform_steadily(performer(), creature_.signals, options_);
+    });
+  }
+
+  /// Where the creature falls by those that keep the error.
+  void take_finer_steps() {
+    while (chosen_ && !command_.open_loop && is_down(main()) && take_next(*chosen_, performer(), creature_.signals)) {
+      warnings().push_back(chosen_->warnings.back());
+      take_steps(options_.replay, chosen_->setting);
+      perform();
+    }
+  }
+
+  void add_warnings() {
+    for (const std::string& warning : retarget::feedback_warnings(performances_, options_.feedback)) warnings().push_back(warning);
+    for (const std::string& warning : retarget::motion_warnings(main().report)) warnings().push_back(warning);
+    if (command_.level.is_asked()) warn_of_lost_way(main(), warnings());
+  }
+
+  void keep_trace() {
+    if (!command_.trace.empty()) write_trace(command_, performer().world, main().trace, every_);
+  }
+
+  /// The motion alone, for -o.
+  int write_alone() {
+    keep_trace();
+    const int exit_code = write_motion(command_, performer(), creature_.appearance, performances_, exports_, way_up_);
+    if (!chosen_) return exit_code;
+    tell_accuracy(*chosen_, performer());
+    return met(told(*chosen_), exit_code);
+  }
+
+  /// The creature's own motion and report.
+  int renew(io::CreatureWriter& writer) {
+    retarget::RunReport& report = creature_.target.report;
+    renew_report(report);
+    try {
+      if (exports_ != io::exports_of(creature_.record)) {
+        io::put_exports(exports_, creature_.record);
+        writer.write("creature.toml", io::to_toml(creature_.record));
+      }
+      write_outcome(writer, performer(), creature_.appearance, creature_.signals, performances_, report,
+                    chosen_ ? &chosen_->curve : nullptr, exports_);
+    } catch (const Error& error) {
+      throw writer.as_seen(error);
+    }
+    writer.commit();
+    keep_trace();  // which may lie in the creature
+    const std::string motion_file = (fs::path(command_.directory) / "failed.glb").string();
+    const int exit_code = command_.json ? tell_report(main(), command_.directory, motion_file, report, way_up_)
+                                        : tell_run(main(), command_.directory, motion_file, way_up_);
+    if (!command_.json) std::cout << saved_words(report);
+    return met(report.accuracy, exit_code);
+  }
+
+  void renew_report(retarget::RunReport& report) {
+    const double signal_error = report.signals.error_rms_l0;
+    report.signals = signals_report(creature_.signals);
+    report.signals.error_rms_l0 = signal_error;
+    stages_.run("measurement", [&] {
+      report.accuracy = chosen_ ? told(*chosen_) : retarget::AccuracyReport();
+      measure(performer(), creature_.signals, options_, report);
+      return 0;
+    });
+    report_replays(performances_, report);
+    report.timing_s = stages_.timing_s;
+  }
+
+  /// The exit code in the end: a replay that went well may be short of the accuracy that was asked for, which it tells.
+  int met(const retarget::AccuracyReport& accuracy, int exit_code) const {
+    if (accuracy.is_met() || exit_code != kDone) return exit_code;
+    std::cerr << too_inaccurate(command_.directory, accuracy) << std::endl;
+    return kShortOfTarget;
+  }
+
+  const ReplayCommand& command_;
+  const int every_;  // control steps a row of the trace
+  Progress progress_;
+  Stages stages_;
+  io::LoadedCreature creature_;
+  retarget::PerformOptions options_;
+  io::Exports exports_;
+  std::optional<ChosenStep> chosen_;
+  retarget::Performances performances_;
+  std::string way_up_;  // what to do where it is down
+};
+
 int replay(const ReplayCommand& command) {
   if (!command.out.empty() && fs::path(command.out).extension() != ".glb") {
     throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
   }
   if (!command.out.empty()) refuse_own_motion(command);
-  Progress progress(std::cerr, progress_style(command.quiet));
-  Stages stages(progress);
-  const int every = steps_per_row(command, {});
-  io::LoadedCreature creature = stages.run("load", [&] { return io::load_creature(command.directory); });
-  const std::vector<std::string> of_conversion = creature.target.report.warnings;  // which told them
-  const retarget::Performer& performer = creature.target.performer;
-  retarget::PerformOptions options = perform_options(command, creature);
-  const WobbleChoice wobble(command.wobble, command.level.is_asked(), command.directory, creature);
-  check_scene(command, creature);
-  const io::Exports exports = exports_of(command, creature.record);
-  if (!command.out.empty()) io::refuse_unwritable_file(command.out);
-  if (!command.out.empty()) io::refuse_exports(command.out, exports);
-  if (!command.trace.empty()) io::refuse_trace(command.trace);
-  Levels levels(command, creature, options, stages);
-  wobble.plan(creature.target.performer);
-  std::optional<ChosenStep> chosen;
-  if (command.accuracy.is_asked()) {
-    chosen = stages.run("accuracy", [&] { return choose_step(command.accuracy, kCommand, performer, creature.signals, std::nullopt); });
-    take_steps(options.replay, chosen->setting);
-  }
-  put_in_scene(command, creature);  // levels and accuracy are of the flat ground
-  options = in_its_world(options, performer);
-  std::optional<io::CreatureWriter> writer;
-  if (command.out.empty()) writer.emplace(command.directory, io::CreatureWriter::Start::amended);
-
-  const auto perform = [&] {
-    return stages.run("replay", [&] {
-      if (!command.level.is_asked()) return retarget::perform(performer, creature.signals, options);
-      return retarget::perform_steadily(performer, creature.signals, options);
-    });
-  };
-  retarget::Performances performances = perform();
-  while (levels.take_better(way_kept(performances.main()), creature)) {
-    wobble.plan(creature.target.performer);
-    put_in_scene(command, creature);
-    performances = perform();
-  }
-  while (chosen && !command.open_loop && is_down(performances.main()) &&
-         take_next(*chosen, performer, creature.signals)) {
-    creature.target.report.warnings.push_back(chosen->warnings.back());
-    take_steps(options.replay, chosen->setting);
-    performances = perform();
-  }
-  std::string way_up = is_down(performances.main()) ? levels.way_up(creature) : "";
-  if (way_up.empty() && is_down(performances.main())) way_up = usual_way_up(command, performances.main());
-  std::vector<std::string>& warnings = creature.target.report.warnings;
-  for (const std::string& warning : retarget::feedback_warnings(performances, options.feedback)) warnings.push_back(warning);
-  for (const std::string& warning : retarget::motion_warnings(performances.main().report)) warnings.push_back(warning);
-  options.feedback = performances.feedback;
-  if (command.level.is_asked()) warn_of_lost_way(performances.main(), warnings);
-  const bool is_met = !chosen || chosen->report.is_met();
-  if (!command.json) tell_level(creature.target.report, command.directory);
-  note_warnings(progress, beyond(of_conversion, warnings), "level: ");
-  const auto keep_trace = [&] {
-    if (!command.trace.empty()) write_trace(command, performer.world, performances.main().trace, every);
-  };
-  if (!writer) {
-    keep_trace();
-    const int exit_code = write_motion(command, performer, creature.appearance, performances, exports, way_up);
-    if (chosen) tell_accuracy(*chosen, performer);
-    if (is_met || exit_code != kDone) return exit_code;
-    std::cerr << too_inaccurate(command.directory, told(*chosen)) << std::endl;
-    return kShortOfTarget;
-  }
-
-  retarget::RunReport& report = creature.target.report;
-  const double signal_error = report.signals.error_rms_l0;
-  report.signals = signals_report(creature.signals);
-  report.signals.error_rms_l0 = signal_error;
-  stages.run("measurement", [&] {
-    report.accuracy = chosen ? told(*chosen) : retarget::AccuracyReport();
-    measure(performer, creature.signals, options, report);
-    return 0;
-  });
-  report_replays(performances, report);
-  report.timing_s = stages.timing_s;
-  try {
-    if (exports != io::exports_of(creature.record)) {
-      io::put_exports(exports, creature.record);
-      writer->write("creature.toml", io::to_toml(creature.record));
-    }
-    write_outcome(*writer, performer, creature.appearance, creature.signals, performances, report, chosen ? &chosen->curve : nullptr,
-                  exports);
-  } catch (const Error& error) {
-    throw writer->as_seen(error);
-  }
-  writer->commit();
-  keep_trace();  // which may lie in the creature
-  const retarget::Replay& run = performances.main();
-  const std::string motion_file = (fs::path(command.directory) / "failed.glb").string();
-  const int exit_code = command.json ? tell_report(run, command.directory, motion_file, report, way_up)
-                                     : tell_run(run, command.directory, motion_file, way_up);
-  if (!command.json) std::cout << saved_words(report);
-  if (is_met || exit_code != kDone) return exit_code;
-  std::cerr << too_inaccurate(command.directory, report.accuracy) << std::endl;
-  return kShortOfTarget;
+  return CreatureReplay(command, steps_per_row(command, {})).run();
 }
 
 }  // namespace

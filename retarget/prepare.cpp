@@ -21,7 +21,6 @@ namespace {
 constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
 constexpr double kOverReach = 4.0 / 3; // times reach: what a clip needs beyond that is held back
-constexpr double kFar = 0.04;         // of L: further no shift should move a clip
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
 constexpr ShiftCosts kLeapCosts{0.12, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
@@ -68,7 +67,7 @@ bool leaps_far(const Motion& target, const physics::Scene& scene, const ContactS
   if (contacts.flight_s(target.rate_hz) < kLeap) return false;
   const Shift shift = find_shift(target, scene, contacts, length, support_friction);
   const double far = std::sqrt(shift.move.squaredNorm() / static_cast<double>(shift.move.cols()));
-  return far > kFar * length;
+  return far > kMostShift * length;
 }
 
 /// The foot lock: the mean offset of each patch to its holds moves its bone's nodes and fades out over the frames around the contact.

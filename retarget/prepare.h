@@ -6,6 +6,8 @@
 
 namespace hydrostat::retarget {
 
+inline constexpr double kMostShift = 0.04;  // of L (RMS): by more preparation is not to move the imported motion
+
 struct PrepareOptions {
   double smooth_hz = 10;         // cut-off of the smoothing (half amplitude)
   double support_friction = 0.7; // of the ground's friction that the plan may use; 5 % more in a far leap

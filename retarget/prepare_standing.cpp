@@ -8,9 +8,8 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kMostShift = 0.04;  // of L, by which preparation may move the imported motion
-constexpr double kLess = 0.5;        // of the shift: so much less is worth the mass
-constexpr double kMissing = 0.01;    // [m g] of missing force that does not count
+constexpr double kLess = 0.5;      // of the shift: so much less is worth the mass
+constexpr double kMissing = 0.01;  // [m g] of missing force that does not count
 
 PreparedTarget prepare_with(const Eigen::VectorXd& mass, const Creature& creature, const ImportedMotion& imported,
                             const CreatureOptions& wished) {

@@ -216,7 +216,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
 /// Once a cycle, by what is seen of the body. What steers by its stretching needs no other way.
 void Run::keep_way() {
   const double period = target_.duration_s();
-  if (!target_.loop || stride_.steers() || time_s_ + 1e-9 < static_cast<double>(cycles_ + 1) * period) return;
+  if (!options_.keep_way || !target_.loop || stride_.steers() || time_s_ + 1e-9 < static_cast<double>(cycles_ + 1) * period) return;
   ++cycles_;
   const WayError error = return_map_.way_error(fit_, cycles_);
   return_map_.end_cycle(error);
@@ -331,7 +331,7 @@ void Run::control() {
   glided_ = reference_;
   glide_.follow(fit_, control_s_);
   glide_.apply(fit_.mean_a, glided_);
-  stride_.follow(fit_, control_s_);
+  if (options_.keep_way) stride_.follow(fit_, control_s_);
   if (brace_) brace_->follow(fit_, reference_, seen, time_s_, control_s_);
   keep_way();
   leap_.apply(time_s_, glide_.yaw, yaw_of(fit_.rotation), physics::centre_of_mass(input_.scene.body, glided_.x), glided_);

@@ -22,6 +22,7 @@ struct ReplayOptions {
   int steps_per_control = 4;    // 120 Hz
   physics::Method method = physics::Method::kExplicit;
   bool correct = true;
+  bool keep_way = true;  // by what is fed back from cycle to cycle: bends, strides, leaps
   CorrectorOptions corrector;
   Observation observation;  // of the corrector
   std::vector<Push> pushes;

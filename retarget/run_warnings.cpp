@@ -63,6 +63,14 @@ std::vector<std::string> target_warnings(const PreparedTarget& prepared, const p
                        patches_in_contact(prepared.contacts, static_cast<std::size_t>(worst)) +
                        "; slow the motion there or put a foot below it");
   }
+  const PreparationReport& moved = prepared.report;
+  if (moved.total_shift_rms_length > kMostShift) {
+    warnings.push_back(sentence("the clip is moved by %.1f %% L (RMS) before the body can do it, of which %.0f %% are to be enough: by %.1f %% to be in "
+                                "balance, %.1f %% to keep its volume and its springs within reach, %.1f %% to stand where its feet do; reference.glb "
+                                "shows it; slower turns and leaps that a foot bears longer are moved less",
+                                100 * moved.total_shift_rms_length, 100 * kMostShift, 100 * moved.momentum_shift_rms_length,
+                                100 * moved.volume_shift_rms_length, 100 * moved.foot_shift_rms_length));
+  }
   const double need = needed_strain(body, prepared.target);
   if (need > kOverLimit * limit) {
     warnings.push_back(sentence("the clip bends and stretches constraints by %.0f %%, the limit allows %.0f %%: expect a smaller motion; ",

@@ -93,9 +93,12 @@ run_polish() {
     done
     creatures+=("$out/polish/$1")
   }
+  polish worm_crawl "$project/samples/worm_crawl.glb"
   polish boxdog_trot "$project/samples/boxdog_trot.fbx"
   polish 'boxdog_trot --nodes 40' "$project/samples/boxdog_trot.fbx" --nodes 40
   polish 'fox --height 0.6' "$assets/gltf/fox.glb" --clip Walk --height 0.6
+  polish frog "$assets/fbx/frog.fbx" --clip Frog_Jump --height 0.15
+  polish snake "$assets/gltf/snake.glb" --clip 'Side winding'
   polish slime "$assets/fbx/slime.fbx" --clip Slime_Walk
   polish spider "$assets/gltf/spider_animated.gltf" --from 1.375 --to 2.125 --height 0.3
   table polish csv "${creatures[@]}"
@@ -110,7 +113,7 @@ run_levels() {
   table levels csv "${reports[@]}"
 }
 run_speed() {
-  "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --nodes 150 --duration 1 --quiet > "$out/speed.txt"
+  "$hydrostat" bench speed "$project/samples/boxdog_trot.fbx" -o "$out/speed" --nodes 150,300,500 --duration 1 --quiet > "$out/speed.txt"
   table speed txt "$out/speed.txt"
 }
 run_import() {

@@ -39,7 +39,7 @@ struct Slope {
 };
 
 /// What the usual feedback is weighed against: deviations of nodes alone; the whole body alone, by its momentum, cones and feet; both
-/// without placing feet where the body is to be caught; and a cost to go.
+/// without placing feet where the body is to be caught; and a cost to go. "unsteered", which set_variant knows, has nothing from cycle to cycle.
 const std::map<std::string, std::string> kNamed{{"deviations", "root=1e-6:cone=0:foot=0:step=0:long_step=1e9"},
                                                 {"whole_body", "nodes=0"},
                                                 {"unplaced", "step=0:long_step=1e9"},
@@ -72,6 +72,10 @@ void set_variant(const std::string& variant, retarget::ReplayOptions& replay, Sl
   std::istringstream parts(variant);
   for (std::string part; std::getline(parts, part, ':');) {
     if (part == "usual" || part == "polished") continue;  // the latter is another creature
+    if (part == "unsteered") {
+      replay.keep_way = false;
+      continue;
+    }
     if (const auto named = kNamed.find(part); named != kNamed.end()) {
       set_variant(named->second, replay, slope, nodes);
       continue;

@@ -1,8 +1,9 @@
 // Writes DIR/balance.html from DIR/balance.csv and DIR/frames: a table of survival and medians, survival curves, looping pictures.
-// Prints the table as well; with a README, puts one of the usual variant between its marks. Fails where a run had a hidden hand. Usage: node page.mjs DIR [README.md]
+// Prints the table as well; with a README, puts those of the usual variant between its marks and the survival curves beside it. Fails where a run had a hidden hand. Usage: node page.mjs DIR [README.md]
 import { existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { write_between_marks } from "../../samples/between_marks.mjs";
+import { survival_svg } from "./survival_svg.mjs";
 
 const [directory, readme] = process.argv.slice(2);
 const [head, ...lines] = readFileSync(join(directory, "balance.csv"), "utf8").trim().split("\n");
@@ -49,6 +50,8 @@ const shown = (value) => (typeof value === "number" ? (Number.isNaN(value) ? "-"
 console.table(Object.fromEntries(summary.map(({ clip, variant, ...rest }) => [`${clip} ${variant}`,
   Object.fromEntries(Object.entries(rest).map(([name, value]) => [name, shown(value)]))])));
 
+const report_of = (clip) => JSON.parse(readFileSync(join(directory, "creatures", clip, "report.json"), "utf8"));
+
 /** What a page for people wants of the usual variant; clips that fall have no medians of what stays up. */
 function readme_table() {
   const lines = summary.filter((row) => row.variant === "usual").map((row) => {
@@ -57,12 +60,54 @@ function readme_table() {
     const { seeds } = grouped.get(`${row.clip},${row.variant}`);
     const fallen = seeds.filter((one) => one.outcome !== "up").map((one) => Number(one.time_s));
     const falls = fallen.length === 0 ? "-" : `${Math.min(...fallen).toFixed(1)} to ${Math.max(...fallen).toFixed(1)} s`;
-    return `| \`${row.clip}\` | ${row.up.replace("/", " of ")} | ${falls} | ${cells.join(" | ")} | ${way} | ${row.pushes.replace("/", " of ")} | ${row["x real time"].toFixed(1)} |`;
+    const moved = (100 * report_of(row.clip).preparation.total_shift_rms_length).toFixed(1);
+    const heading = Number.isNaN(row["heading deg"]) ? "-" : row["heading deg"].toFixed(2);
+    return `| \`${row.clip}\` | ${moved} | ${row.up.replace("/", " of ")} | ${falls} | ${cells.join(" | ")} | ${heading} | ${way} | ${row.pushes.replace("/", " of ")} | ${row["x real time"].toFixed(1)} |`;
   });
-  return ["| clip | keeps its feet | falls at | from its plan, % L | from the clip, % L | drift a cycle, % L | slip a stance, % L | of it, where the target holds | way | bears pushes | times real time |",
+  return ["| clip | moved by preparation, % L | keeps its feet | falls at | from its plan, % L | from the clip, % L | drift a cycle, % L | slip a stance, % L | of it, where the target holds | turns a cycle, degrees | way | bears pushes | times real time |",
+          "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |", ...lines].join("\n");
+}
+
+/** The same settings on other meshes: a line for each clip and mesh, of what README wants. */
+function mesh_table() {
+  const lines = summary.filter((row) => row.variant === "usual").map((row) => {
+    const creature = join(directory, "creatures", row.clip);
+    // What a creature's record says of its feedback is only what it has instead of the usual.
+    const record = readFileSync(join(creature, "creature.toml"), "utf8");
+    const otherwise = [...record.matchAll(/^corrector_(\w+) = /gm)].map(([, name]) => name.replace("_", " "));
+    if (record.includes("rest_lengths = 'fitted'")) otherwise.push("fitted rest lengths");
+    if (record.includes("load = 'spread'")) otherwise.push("load spread");
+    const { seeds } = grouped.get(`${row.clip},${row.variant}`);
+    const [clip, asked] = row.clip.split("@");
+    const of = (name, digits) => Number.isNaN(row[name]) ? "-" : row[name].toFixed(digits);
+    const away = seeds.filter((one) => one.outcome === "up").map((one) => 100 * Math.abs(one.drift)).filter((value) => !Number.isNaN(value));
+    const farthest = away.length === 0 ? "-" : Math.max(...away).toFixed(2);
+    const way = Number.isNaN(row.travel) ? "-" : `${(100 * row.travel).toFixed(0)} %`;
+    return `| \`${clip}\` | ${asked} | ${report_of(row.clip).body.nodes} | ${row.up.replace("/", " of ")} | ${of("shape %L", 2)} | ${of("drift %L", 2)} | ${farthest} | ${of("held slip %L", 2)} | ${way} | ${otherwise.join(", ") || "-"} | ${row["x real time"].toFixed(2)} |`;
+  });
+  return ["| clip | nodes asked for | got | keeps its feet | from its plan, % L | drift a cycle, % L | farthest of all | slip where the target holds | way | instead of the usual | times real time |",
           "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |", ...lines].join("\n");
 }
-if (readme) write_between_marks(readme, "tests/balance/run.sh -r", readme_table());
+
+/** Of each clip that falls: when, and by which limb it was told. */
+function falls_table() {
+  const lines = [];
+  for (const { clip, variant, seeds } of grouped.values()) {
+    const causes = seeds.filter((row) => variant === "usual" && row.outcome === "fell")
+      .map((row) => row.fall_cause.match(/\(frame (\d+)\) limb '(.*)' is ([\d.]+) m .*; (\d+) % .* limit of ([\d.]+)/)).filter(Boolean);
+    if (causes.length === 0) continue;
+    const range = (k, digits) => {
+      const values = causes.map((cause) => Number(cause[k]));
+      return [...new Set([Math.min(...values), Math.max(...values)].map((value) => value.toFixed(digits)))].join(" to ");
+    };
+    const bodies = (limb) => causes.filter((cause) => cause[2] === limb).length;
+    const limbs = [...new Set(causes.map((cause) => cause[2]))].sort((a, b) => bodies(b) - bodies(a));
+    const told = limbs.map((limb) => `\`${limb}\` (${bodies(limb)})`).join(", ");
+    lines.push(`| \`${clip}\` | ${range(1, 0)} | ${told} | ${range(3, 2)} | ${range(4, 0)} % of ${range(5, 2)} |`);
+  }
+  return ["| clip | falls in the clip's frames (60 Hz) | limbs farthest from their target then (bodies) | by, m | their constraints at the limit |", "| --- | --- | --- | --- | --- |",
+          ...lines].join("\n");
+}
 
 // Survival: the share of the seeds that are still up, over the share of the time that was asked.
 const kColours = ["#2563eb", "#dc2626", "#059669", "#d97706", "#7c3aed", "#0891b2", "#be185d", "#4d7c0f"];
@@ -73,6 +118,22 @@ function asked_s(row) {
   const simulated = Number(row.time_s) + (row.outcome === "up" ? 0 : kUntilTold);
   return row.loop === "1" ? Number(row.cycles_wanted) * simulated / Number(row.cycles) : simulated;
 }
+if (readme && rows.every((row) => row.clip.includes("@"))) {
+  write_between_marks(readme, "tests/balance/run.sh -m -r", mesh_table());
+} else if (readme) {
+  write_between_marks(readme, "tests/balance/run.sh -r", readme_table());
+  write_between_marks(readme, "tests/balance/run.sh -r: falls", falls_table());
+  const clips = [...grouped.values()].filter(({ variant, seeds }) => variant === "usual" && seeds.length > 0).map(({ clip, seeds }) => ({
+    name: clip,
+    bodies: seeds.length,
+    asked_s: Math.max(...seeds.map(asked_s)),
+    fall_times_s: seeds.filter((row) => row.outcome === "fell").map((row) => Number(row.time_s)),
+  }));
+  const picture = join(dirname(readme), "samples/figures/survival.svg");
+  writeFileSync(`${picture}.part`, survival_svg(clips));
+  renameSync(`${picture}.part`, picture);
+}
+
 function curve(seeds) {
   const longest = Math.max(...seeds.map(asked_s));
   const falls = seeds.filter((row) => row.outcome === "fell").map((row) => Number(row.time_s) / longest).sort((a, b) => a - b);

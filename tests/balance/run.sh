@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
 # The balance bench: how long creatures keep their feet, over clips, seeds, pushes and variants of the corrector.
-#   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-w SCENE] [-j JOBS] [-r]
+#   tests/balance/run.sh [-o DIR] [-c "CLIP ..."] [-v "VARIANT ..."] [-s SEEDS] [-n CYCLES] [-p SPEED] [-w SCENE] [-m "NODES ..."] [-j JOBS] [-r]
 # Writes DIR/balance.csv and DIR/balance.html (default DIR: out/balance). A run that is there is not run again; one that was
 # broken off goes on where it was. -p SPEED adds, for the plan's body, pushes of so many m/s in 8 directions at 4 phases. -w SCENE lets all go in a
 # creature's scene (README, "A creature's scene"). A variant that begins with "polished" goes by polished signals (README, "Polish");
-# "polished:delay=0.02" likewise. -r writes README's table. Fails where a run has a hidden hand: an assist, or momentum that gravity,
+# "polished:delay=0.02" likewise. -m NODES makes of each clip a creature on so many nodes, CLIP@NODES, instead of the usual mesh. -r writes
+# README's table (with -m that of the meshes). Fails where a run has a hidden hand: an assist, or momentum that gravity,
 # contact and effects do not explain.
 set -euo pipefail
 project=$(dirname -- "$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")")
 assets=${HYDROSTAT_ASSETS:-$project/../shared/assets}
-out=$project/out/balance clips="" variants=usual seeds=20 cycles=50 speed="" scene="" jobs=$(nproc) readme=""
-while getopts o:c:v:s:n:p:w:j:r option; do
+out=$project/out/balance clips="" variants=usual seeds=20 cycles=50 speed="" scene="" meshes=usual jobs=$(nproc) readme=""
+while getopts o:c:v:s:n:p:w:m:j:r option; do
   case $option in
     o) out=$(realpath -m -- "$OPTARG") ;;
     c) clips=$OPTARG ;;
@@ -19,6 +20,7 @@ while getopts o:c:v:s:n:p:w:j:r option; do
     n) cycles=$OPTARG ;;
     p) speed=$OPTARG ;;
     w) scene=$(realpath -- "$OPTARG") ;;
+    m) meshes=$OPTARG ;;
     j) jobs=$OPTARG ;;
     r) readme=README.md ;;
     *) exit 2 ;;
@@ -81,13 +83,17 @@ while IFS='|' read -r name file options; do
     echo "$name: left out, $file is missing (set HYDROSTAT_ASSETS)"
     continue
   fi
-  names+=("$name")
   eval "options=($options)"
-  for variant in $variants; do
-    creature=$(creature_of "$name" "$variant")
-    polish=()
-    [ "$creature" = "$name" ] || polish=(--polish on)
-    make_creature "$creature" "$file" "${options[@]}" "${polish[@]}"
+  for mesh in $meshes; do
+    body=$name nodes=()
+    [ "$mesh" = usual ] || body=$name@$mesh nodes=(--nodes "$mesh")
+    names+=("$body")
+    for variant in $variants; do
+      creature=$(creature_of "$body" "$variant")
+      polish=()
+      [ "$creature" = "$body" ] || polish=(--polish on)
+      make_creature "$creature" "$file" "${options[@]}" "${nodes[@]}" "${polish[@]}"
+    done
   done
 done <<< "$table"
 

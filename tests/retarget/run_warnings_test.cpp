@@ -36,6 +36,22 @@ TEST(TargetWarnings, TellOfAClipThatNeedsFarMoreThanTheLimit) {
   EXPECT_TRUE(target_warnings(performer.prepared, performer.scene.body, 0.025, false).empty());
 }
 
+TEST(TargetWarnings, TellHowFarAClipIsMovedWhereThatIsTooFar) {
+  Performer performer = make_box_performer();
+  PreparationReport& report = performer.prepared.report;
+  report.total_shift_rms_length = 0.0399;
+  EXPECT_TRUE(target_warnings(performer.prepared, performer.scene.body, 0.1, true).empty());
+  report.total_shift_rms_length = 0.0633;
+  report.momentum_shift_rms_length = 0.0581;
+  report.volume_shift_rms_length = 0.0221;
+  report.foot_shift_rms_length = 0.0016;
+  const auto warnings = target_warnings(performer.prepared, performer.scene.body, 0.1, true);
+  ASSERT_EQ(warnings.size(), 1U);
+  for (const char* words : {"moved by 6.3 % L", "5.8 % to be in balance", "2.2 % to keep its volume", "0.2 % to stand"}) {
+    EXPECT_NE(warnings[0].find(words), std::string::npos) << words << ": " << warnings[0];
+  }
+}
+
 TEST(InverseWarnings, ComeOnePerFigureThatIsTooLarge) {
   InverseReport report;
   EXPECT_TRUE(inverse_warnings(report).empty());

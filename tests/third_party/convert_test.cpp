@@ -135,7 +135,8 @@ TEST(ThirdPartyClips, TheSpiderWalksWhoseBellyHangsOver) {
 
 TEST(ThirdPartyClips, TheFrogHopsItsWay) {
   expect_creature({"fbx/frog.fbx", "--clip Frog_Jump --height 0.15"}, [](const fs::path& creature) {
-    const json run = report_of(creature)["replay"]["closed_loop"];
+    const json report = report_of(creature), run = report["replay"]["closed_loop"];
+    EXPECT_LE(report["preparation"]["total_shift_rms_length"], 0.04);
     EXPECT_LE(std::abs(run["drift_per_cycle_length"].get<double>()), 0.01);  // over five cycles
     EXPECT_LE(std::abs(run["heading_deg_per_cycle"].get<double>()), kHeading);
     EXPECT_NEAR(run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>(), 1, 0.03);

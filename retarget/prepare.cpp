@@ -23,7 +23,7 @@ constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
 constexpr double kOverReach = 4.0 / 3; // times reach: what a clip needs beyond that is held back
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
 constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
-constexpr ShiftCosts kLeapCosts{0.075, 0.2};  // of a leap that would be moved further: it launches by force and lands softly
+constexpr ShiftCosts kLeapCosts{0.075, 0.2};  // of a leap that would be moved further: it launches by force and lands softly; measured on a frog
 constexpr double kLeapFriction = 1.05;  // times the usual share of friction: it is moved less
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
 constexpr double kReachInFlight = 0.065;  // strain that its shape is held back less where nothing bears,

@@ -118,7 +118,11 @@ function asked_s(row) {
   const simulated = Number(row.time_s) + (row.outcome === "up" ? 0 : kUntilTold);
   return row.loop === "1" ? Number(row.cycles_wanted) * simulated / Number(row.cycles) : simulated;
 }
-if (readme && rows.every((row) => row.clip.includes("@"))) {
+const of_meshes = rows.filter((row) => row.clip.includes("@")).length;
+if (readme && of_meshes > 0 && of_meshes < rows.length) {
+  console.error("page.mjs: creatures on the usual mesh and on others together have no table in README. Leave 'usual' out of -m, or -r.");
+  process.exit(2);
+} else if (readme && of_meshes > 0) {
   write_between_marks(readme, "tests/balance/run.sh -m -r", mesh_table());
 } else if (readme) {
   write_between_marks(readme, "tests/balance/run.sh -r", readme_table());

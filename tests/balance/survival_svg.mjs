@@ -1,5 +1,5 @@
 // The picture of survival: of each clip's bodies the share that is still up, over the time.
-const kWidth = 790, kTop = 62, kAcross = 5, kPanel = 128, kHigh = 74, kGap = 24, kRow = 128, kLeft = 40; // [px]
+const kWidth = 790, kTop = 62, kAcross = 5, kPanel = 128, kHigh = 74, kGap = 24, kRow = 128, kLeft = 16; // [px]
 const kUp = '#1f6fb4', kFalling = '#b5372f';
 
 const px = (value) => Number(value.toFixed(1));
@@ -30,6 +30,6 @@ export function survival_svg(clips) {
   let svg = `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${kWidth} ${height}" role="img" font-family="sans-serif" font-size="10">` +
     '<rect width="100%" height="100%" fill="#fff"/>\n<text x="8" y="20" font-size="14" font-weight="bold">Survival: bodies off the plan that are still up</text>\n' +
     '<text x="8" y="36" font-size="11">From top (all) to bottom (none), over the seconds on a logarithmic scale, to the end of what was asked.</text>\n';
-  clips.forEach((clip, k) => (svg += panel(clip, kLeft - 32 + (k % kAcross) * (kPanel + kGap) + 8, kTop + 14 + Math.floor(k / kAcross) * kRow)));
+  clips.forEach((clip, k) => (svg += panel(clip, kLeft + (k % kAcross) * (kPanel + kGap), kTop + 14 + Math.floor(k / kAcross) * kRow)));
   return `${svg}</svg>\n`;
 }

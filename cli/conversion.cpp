@@ -297,7 +297,7 @@ retarget::PerformOptions Conversion::perform_options() const {
 void Conversion::perform(const std::string& stage, const retarget::Feedback& feedback) {
   retarget::PerformOptions options = perform_options();
   options.feedback = feedback;
-  key_ = key_after(key_, signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
+  key_ = key_after(key_, "heavy bodies on trial", signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
   if (chosen_) key_ = key_after(key_, options.replay.step_s);
   performances_ = stages_.run(stage, key_, [&] { return retarget::perform_steadily(performer(), signals_, options); });
 }
@@ -329,7 +329,7 @@ void Conversion::polish() {
     signals_text_ = io::signals_text(signals_);
     return;
   }
-  if (performances_.wished_lapse == retarget::Lapse::kNothing) {
+  if (performances_.wished_lapse == retarget::Lapse::kNothing && performances_.feedback == before.feedback) {
     performances_.wished_lapse = before.wished_lapse;
     performances_.trials_lost = before.trials_lost;
   }

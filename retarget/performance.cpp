@@ -17,6 +17,7 @@ constexpr double kLeastTravel = 0.05;  // of L a cycle, of a clip that travels
 constexpr double kOffTravel = 0.08;    // of it, more or less, from which its way is lost
 constexpr double kOffDrift = 0.04;     // likewise of drift a cycle: measured, what is well drifts by 1.3 % at most, what staggers by 5 % and more
 constexpr double kLeastCycles = 4;     // of a loop, which tell its drift
+constexpr double kLookSeconds = 6;     // at most, for which bodies off the plan go where the planned one keeps its way
 constexpr double kCircle = 10 * M_PI / 180;  // by which a clip turns before its way ends elsewhere than it led to
 // Tried in this order. The regulator keeps nearest to the path; where it leaves large errors to the corrector more pushes are recovered, but
 // some bodies are lost that it holds alone. The quick ones keep bodies up whose feet slide under the usual gain.
@@ -88,6 +89,44 @@ Replay run_trial(const Trial& trial, const Performer& performer, const SignalSet
 Lapse lapse_of(double straying) {
   if (straying == HUGE_VAL) return Lapse::kFell;
   return straying > 1 ? Lapse::kLostWay : Lapse::kNothing;
+}
+
+/// Whether a body off the plan falls, or loses the way of its loop; where a single run ends hangs on the body.
+bool is_lost(const Performer& performer, const PerformOptions& options, const Replay& run) {
+  if (run.report.fell || run.termination != physics::Termination::kDone) return true;
+  return performer.prepared.target.loop && straying(performer, options.replay, run) > 1;
+}
+
+/// How many of kTrials from the `first` on, two at once, are lost.
+int pair_lost(std::size_t first, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  const auto loses = [&](std::size_t k) { return is_lost(performer, options, run_trial(kTrials[k], performer, signals, options)) ? 1 : 0; };
+  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, loses, first);
+  const int second = loses(first + 1);
+  return beside.get() + second;
+}
+
+/// Where the planned body keeps its way and heavy ones, which of our clips are lost first, do not: the regulator on which fewest of kTrials are lost, if those are fewer.
+void keep_more_bodies(const Performer& performer, const SignalSet& signals, const PerformOptions& options, Performances& result) {
+  static_assert(kTrials.size() == 4, "two pairs");
+  PerformOptions on_trial = options, other = options;
+  on_trial.replay.duration_s = std::min(options.replay.duration_s, kLookSeconds);
+  other.baselines = false;
+  result.trials_lost = pair_lost(0, performer, signals, on_trial);
+  if (result.trials_lost > 0) result.trials_lost += pair_lost(2, performer, signals, on_trial);
+  for (const Feedback& feedback : kOthers) {
+    if (feedback.regulator == 0 || feedback == options.feedback) continue;  // others are for feet that the usual gain shakes loose
+    on_trial.feedback = other.feedback = feedback;
+    int lost = 0;
+    for (std::size_t first = 0; first < kTrials.size() && lost < result.trials_lost; first += 2) {
+      lost += pair_lost(first, performer, signals, on_trial);
+    }
+    if (lost >= result.trials_lost) continue;
+    Performances next = perform(performer, signals, other);
+    if (straying(performer, options.replay, next.main()) > 1) continue;
+    result.trials_lost = lost;
+    result.closed_loop = std::move(next.closed_loop);
+    result.feedback = feedback;
+  }
 }
 
 }  // namespace
@@ -165,7 +204,7 @@ TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals,
   beside.get();
   TrialsOutcome result;
   for (const Replay& run : runs) {
-    if (run.report.fell || run.termination != physics::Termination::kDone) ++result.lost;
+    if (is_lost(performer, options, run)) ++result.lost;
     result.shape_rms_length += run.report.shape_rms_length / static_cast<double>(runs.size());
   }
   return result;
@@ -176,6 +215,10 @@ Performances perform_steadily(const Performer& performer, const SignalSet& signa
   if (!options.closed_loop) return result;
   double least = straying(performer, options.replay, result.main());
   result.wished_lapse = lapse_of(least);
+  if (least <= 1) {
+    if (options.is_thorough) keep_more_bodies(performer, signals, options, result);
+    return result;
+  }
   PerformOptions other = options;
   other.baselines = false;
   for (const Feedback& feedback : kOthers) {

@@ -57,7 +57,7 @@ struct Performances {
   Feedback feedback;  // of the closed loop
   // Told by perform_steadily: what the closed loop comes short of, and what it did on the feedback that was wished.
   Lapse lapse = Lapse::kNothing, wished_lapse = Lapse::kNothing;
-  int trials_lost = 0;  // and how many of kTrials fell on what took its place; 0 where that was not asked
+  int trials_lost = 0;  // and how many of kTrials are lost on what was taken; 0 where that was not asked
 
   /// The closed loop where there is one, else the open loop.
   const Replay& main() const { return closed_loop ? *closed_loop : *open_loop; }
@@ -102,7 +102,7 @@ Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const R
 
 /// What became of kTrials.
 struct TrialsOutcome {
-  int lost = 0;                 // that fell or diverged
+  int lost = 0;                 // that fell or diverged, or lost the way of their loop (lapse_of)
   double shape_rms_length = 0;  // as in ReplayReport, the mean of all, as long as they went
 };
 /// Lets kTrials go by the options' feedback, as long as the options have it.
@@ -110,8 +110,9 @@ TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals,
 
 /// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, where the options
 /// are thorough a regulator, such as looks less far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times
-/// as much. The first that does neither counts; where the options are thorough, the first on which all of kTrials stay up too, or else
-/// that on which most of them do. Where none keeps the body on its way, what stays up and strays least, the earlier one unless a later
+/// as much. The first that does neither counts; where the options are thorough, the first on which none of kTrials is lost either, or else
+/// that on which fewest are, and where the body keeps its way on what was wished but heavy ones of kTrials do not, the regulators are tried
+/// likewise. Where none keeps the body on its way, what stays up and strays least, the earlier one unless a later
 /// strays less than half as far. On some bodies, coarse ones above all, a gain that others need shakes the feet loose.
 Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 

@@ -99,17 +99,21 @@ std::vector<std::string> inverse_warnings(const InverseReport& inverse) {
 
 std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished) {
   const bool is_lost = performances.lapse == Lapse::kLostWay, fell = performances.wished_lapse == Lapse::kFell;
+  const bool was_well = performances.wished_lapse == Lapse::kNothing;
+  const std::string lost = sentence("of %d bodies %.0f %% off the plan, shoved by %.1f m/s, it loses %d", static_cast<int>(kTrials.size()),
+                                    100 * kTrialVariation, kTrialShove, performances.trials_lost);
   if (performances.feedback == wished) {
-    if (!is_lost) return {};
-    return {"feedback: the creature " + way_in_words(performances.main().report) + ", and strays half as far on no other gain"};
+    if (is_lost) return {"feedback: the creature " + way_in_words(performances.main().report) + ", and strays half as far on no other gain"};
+    if (performances.trials_lost == 0) return {};
+    return {"feedback: " + lost + ", and fewer by no regulator"};
   }
   const std::string usual = wished == Feedback() ? "the usual gain" : "its own gain";
-  const std::string instead = fell ? "stays up " : is_lost ? "strays less " : "keeps it ";
-  const std::string taken = "feedback: on " + usual + " the creature " + (fell ? "falls" : "loses its way") + ", it " + instead + in_words(performances.feedback);
+  const std::string lapse = was_well ? "loses bodies off the plan" : fell ? "falls" : "loses its way";
+  const std::string instead = was_well ? "keeps more of them " : fell ? "stays up " : is_lost ? "strays less " : "keeps it ";
+  const std::string taken = "feedback: on " + usual + " the creature " + lapse + ", it " + instead + in_words(performances.feedback);
   if (is_lost) return {taken + ", but " + way_in_words(performances.main().report)};
   if (performances.trials_lost == 0) return {taken};
-  return {taken + sentence("; of %d bodies %.0f %% off the plan, shoved by %.1f m/s, it loses %d", static_cast<int>(kTrials.size()),
-                           100 * kTrialVariation, kTrialShove, performances.trials_lost)};
+  return {taken + "; " + lost};
 }
 
 bool is_assisted(const ReplayReport& run) { return run.external_assist_mg > kAssist; }

@@ -127,6 +127,27 @@ TEST(PerformSteadily, TakesWhatKeepsUpThePlannedBodyAndMostOfThoseOffThePlan) {
   EXPECT_TRUE(steady.main().motion.frames == perform_by(*taken, performer, signals, options).main().motion.frames);
 }
 
+/// Feedback that knows a little late keeps the planned body up by the usual gain and loses most off the plan; a regulator keeps more.
+TEST(PerformSteadily, TakesARegulatorWhereThePlannedBodyIsWellAndThoseOffThePlanAreNot) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  PerformOptions options = lasting(1.5);
+  options.replay.observation.delay_s = 0.06;
+  ASSERT_FALSE(perform_by({}, performer, signals, options).main().report.fell);
+  const int lost = go_on_trials(performer, signals, options).lost;
+  ASSERT_GT(lost, 0);
+  EXPECT_EQ(perform_steadily(performer, signals, options).feedback, Feedback()) << "a level of detail has no time for trials";
+
+  options.is_thorough = true;
+  const Performances steady = perform_steadily(performer, signals, options);
+  EXPECT_EQ(steady.feedback, kInTurn[0]);
+  EXPECT_LT(steady.trials_lost, lost);
+  EXPECT_EQ(steady.wished_lapse, Lapse::kNothing);
+  EXPECT_EQ(steady.lapse, Lapse::kNothing);
+  EXPECT_TRUE(steady.naive && steady.open_loop);
+  EXPECT_TRUE(steady.main().motion.frames == perform_by(kInTurn[0], performer, signals, options).main().motion.frames);
+}
+
 /// A level of detail has no time for trials, nor for regulators.
 TEST(PerformSteadily, TakesTheFirstGainThatStaysUpWhereItIsNotThorough) {
   const Performer performer = make_box_performer();

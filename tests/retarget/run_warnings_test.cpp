@@ -104,6 +104,12 @@ TEST(FeedbackWarnings, TellWhichGainWasTakenAndWhy) {
   unsure.trials_lost = 2;
   EXPECT_EQ(told(unsure), "feedback: on the usual gain the creature falls, it stays up where a regulator answers all; of 4 bodies 10 % off the plan, "
                           "shoved by 0.1 m/s, it loses 2");
+  unsure = performances_of(0.5, {}, Lapse::kNothing, Lapse::kNothing);
+  unsure.trials_lost = 1;
+  EXPECT_EQ(told(unsure), "feedback: of 4 bodies 10 % off the plan, shoved by 0.1 m/s, it loses 1, and fewer by no regulator");
+  unsure.feedback = {1, 1, 1, 1};
+  EXPECT_EQ(told(unsure), "feedback: on the usual gain the creature loses bodies off the plan, it keeps more of them where a regulator answers all; "
+                          "of 4 bodies 10 % off the plan, shoved by 0.1 m/s, it loses 1");
   EXPECT_EQ(told(performances_of(0.4, {}, Lapse::kLostWay, Lapse::kLostWay)),
             "feedback: the creature makes 80 % of the clip's way and drifts 2.5 % L a cycle, and strays half as far on no other gain");
 }

@@ -97,17 +97,23 @@ bool is_lost(const Performer& performer, const PerformOptions& options, const Re
   return performer.prepared.target.loop && straying(performer, options.replay, run) > 1;
 }
 
-/// How many of kTrials from the `first` on, two at once, are lost.
-int pair_lost(std::size_t first, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  const auto loses = [&](std::size_t k) { return is_lost(performer, options, run_trial(kTrials[k], performer, signals, options)) ? 1 : 0; };
-  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, loses, first);
-  const int second = loses(first + 1);
-  return beside.get() + second;
+/// The `first` of kTrials and the next, side by side.
+std::array<Replay, 2> run_pair(std::size_t first, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  const auto go = [&](std::size_t k) { return run_trial(kTrials[k], performer, signals, options); };
+  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, first);
+  Replay second = go(first + 1);
+  return {beside.get(), std::move(second)};
 }
 
-/// Where the planned body keeps its way and heavy ones, which of our clips are lost first, do not: the regulator on which fewest of kTrials are lost, if those are fewer.
+/// How many of these are lost.
+int pair_lost(std::size_t first, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  const std::array<Replay, 2> runs = run_pair(first, performer, signals, options);
+  return static_cast<int>(std::count_if(runs.begin(), runs.end(), [&](const Replay& run) { return is_lost(performer, options, run); }));
+}
+
+/// Where the planned body keeps its way and heavy ones, which of our clips are lost first, do not: the regulator on which fewest of
+/// kTrials are lost, if those are fewer.
 void keep_more_bodies(const Performer& performer, const SignalSet& signals, const PerformOptions& options, Performances& result) {
-  static_assert(kTrials.size() == 4, "two pairs");
   PerformOptions on_trial = options, other = options;
   on_trial.replay.duration_s = std::min(options.replay.duration_s, kLookSeconds);
   other.baselines = false;
@@ -195,17 +201,13 @@ Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const R
 }
 
 TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  std::array<Replay, kTrials.size()> runs;
-  const auto go = [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) runs[k] = run_trial(kTrials[k], performer, signals, options);
-  };
-  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, 0, runs.size() / 2);
-  go(runs.size() / 2, runs.size());
-  beside.get();
+  static_assert(kTrials.size() % 2 == 0, "they go in pairs");
   TrialsOutcome result;
-  for (const Replay& run : runs) {
-    if (is_lost(performer, options, run)) ++result.lost;
-    result.shape_rms_length += run.report.shape_rms_length / static_cast<double>(runs.size());
+  for (std::size_t first = 0; first < kTrials.size(); first += 2) {
+    for (const Replay& run : run_pair(first, performer, signals, options)) {
+      if (is_lost(performer, options, run)) ++result.lost;
+      result.shape_rms_length += run.report.shape_rms_length / static_cast<double>(kTrials.size());
+    }
   }
   return result;
 }

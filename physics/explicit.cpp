@@ -110,6 +110,11 @@ class ExplicitStepper final : public StepperOf<Dim> {
     return work;
   }
 
+  bool shorten(int times) override {
+    shorter_ = times;
+    return true;
+  }
+
   void forget() override { contact_.forget(); }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -119,7 +124,8 @@ class ExplicitStepper final : public StepperOf<Dim> {
     // The bound at rest, shortened by as much as the shape from which the step starts is stiffer.
     const bool is_in_stages = is_staged(dt);
     const double stiffer = forces_.stiffening(state.x), more_damped = is_in_stages ? dashpots_->stiffening(state.x) : 1;
-    const double count = std::ceil(dt / (is_in_stages ? staged_substep(dt, stiffer, more_damped) : plain_substep(stiffer)));
+    const double longest = is_in_stages ? staged_substep(dt, stiffer, more_damped) : plain_substep(stiffer);
+    const double count = std::ceil(shorter_ * dt / longest);
     if (!(count <= most_substeps_)) return Termination::kDiverged;
     const int substeps = static_cast<int>(count);
     work_.passes += substeps;
@@ -243,6 +249,7 @@ class ExplicitStepper final : public StepperOf<Dim> {
   std::optional<DashpotStages<Dim>> dashpots_;  // where there are any
   bool is_between_;  // substeps take their forces between the places that the steps tell
   double most_substeps_;
+  int shorter_ = 1;  // than the bound asks for
   StateOf<Dim> start_;
   StiffestModes at_rest_{};
   double shortest_edge_ = 0;  // [m]

@@ -52,7 +52,7 @@ class GuardedStepper final : public StepperOf<Dim> {
     for (int parts = 1; !is_broken && parts <= (is_guarding_ ? 1 : options_.most_parts); parts *= 2) {
       if (parts > 1) accurate_->forget();
       const double passes = accurate_->work().passes;
-      if (step_in_parts(*accurate_, parts, dt, activation, effect_force, state, impulses) == Termination::kDone &&
+      if (step_accurately(parts, dt, activation, effect_force, state, impulses) == Termination::kDone &&
           is_sound(activation, state, impulses, dt / std::max(1.0, accurate_->work().passes - passes))) {
         is_guarding_ = false;
         return Termination::kDone;
@@ -87,6 +87,14 @@ class GuardedStepper final : public StepperOf<Dim> {
       add(part_, impulses);
     }
     return Termination::kDone;
+  }
+
+  Termination step_accurately(int parts, double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force,
+                              StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
+    const bool has_substeps = accurate_->shorten(parts);
+    const Termination end = step_in_parts(*accurate_, has_substeps ? 1 : parts, dt, activation, effect_force, state, impulses);
+    accurate_->shorten(1);
+    return end;
   }
 
   /// From the step's start to `state` [J], of what comes from without.

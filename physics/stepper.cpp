@@ -5,7 +5,7 @@
 namespace hydrostat::physics {
 namespace {
 
-constexpr GuardOptions kExplicitGuard{.growth = 0.05, .is_staggered = true};
+constexpr GuardOptions kExplicitGuard{.growth = 0.05, .most_parts = 4, .is_staggered = true};
 constexpr GuardOptions kImplicitGuard{.growth = 0.5, .most_parts = 4};
 
 }  // namespace

@@ -22,6 +22,8 @@ class StepperOf {
                            StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) = 0;
   /// The method's own substep [s] for an outer step dt from the rest shape.
   virtual double substep(double dt) const = 0;
+  /// Its substeps from now on: so many times as short as its own bound asks for. False: it has none, and all stays as it is.
+  virtual bool shorten([[maybe_unused]] int times) { return false; }
   /// To be called when the next state is not the one that the last step left behind.
   virtual void forget() {}
   /// Steps so far in which another method took over.
@@ -46,8 +48,8 @@ struct GuardOptions {
   bool is_staggered = false;  // velocities lie half a substep, one pass over the body, away from the places at which forces are taken
 };
 /// A step of `accurate` that ends with an inverted tet, with much more energy than was there or was brought in, or with what
-/// is no number is tried again in shorter ones, where the options say so, and then taken again by euler, and so is every step
-/// from a state with an inverted tet.
+/// is no number is tried again in shorter ones (of a method with substeps: in shorter of those), where the options say so, and
+/// then taken again by euler, and so is every step from a state with an inverted tet.
 template <int Dim>
 std::unique_ptr<StepperOf<Dim>> make_guarded_stepper(const SceneOf<Dim>& scene, std::unique_ptr<StepperOf<Dim>> accurate,
                                                      const GuardOptions& options);

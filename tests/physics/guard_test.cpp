@@ -180,5 +180,42 @@ TEST(Guard, TriesAStepAgainInShorterOnesWhereToldTo) {
   }
 }
 
+TEST(Guard, ShortensTheSubstepsOfABodyStrainedFarBeforeItGivesAStepToEuler) {
+  int unstable = 0;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const SceneOf<3> scene = in_the_air(random_body<3>(seed), false);
+    const BodyOf<3>& body = scene.body;
+    std::mt19937 random(seed);
+    StateOf<3> state{1.3 * body.rest, rigid_velocity<3>(body, body.rest, {1, 2, 0}, random_spin<3>(random, 6))};
+    state.x += random_points<3>(random, body.node_count(), 0.1 * body.rest_length.mean());
+    const Eigen::VectorXd activation = random_activation(random, body, 0.3);
+    InternalForces<3> forces(body);
+    ASSERT_TRUE(forces.set_activation(activation));
+    const auto energy = [&](const StateOf<3>& at) { return kinetic_energy(body, at.v) + forces.elastic_energy(at.x); };
+    const auto spin = [&](const StateOf<3>& at) -> SpinOf<3> {
+      return angular_momentum(body, at.x, at.v, centre_of_mass(body, at.x));
+    };
+    const SpinOf<3> at_first = spin(state);
+    // Returns the most that a step makes of the energy [-].
+    const auto run = [&](StepperOf<3>& stepper, StateOf<3> at) {
+      ImpulsesOf<3> impulses = make_impulses(scene);
+      double growth = 0;
+      for (int k = 0; k < 30; ++k) {
+        const double before = energy(at);
+        EXPECT_EQ(stepper.step(kDt, activation, nullptr, at, impulses), Termination::kDone);
+        growth = std::max(growth, energy(at) / before);
+      }
+      EXPECT_LT((spin(at) - at_first).norm(), 1e-9 * at_first.norm());
+      return growth;
+    };
+    const std::unique_ptr<StepperOf<3>> guarded = make_stepper(Method::kExplicit, scene);
+    EXPECT_LT(run(*guarded, state), 1.05);
+    EXPECT_EQ(guarded->guard_steps(), 0);
+    if (run(*make_explicit_stepper(scene), state) > 1.05) ++unstable;
+  }
+  EXPECT_GT(unstable, 0);
+}
+
 }  // namespace
 }  // namespace hydrostat::physics::guard_test

@@ -21,6 +21,7 @@ struct RegulatorOptions {
   double learn = 0.3;    // share of what a step's end was off its prediction that counts as a disturbance of the next [-]; more hums
   double keep = 0.7;     // share of a disturbance that is left a control step later, as it is learned [-]
   double last = 0.5;     // and as the muscles meet it [-]
+  bool operator==(const RegulatorOptions&) const = default;
 };
 
 /// What a regulator needs to know of a planned motion.

@@ -52,19 +52,19 @@ FeedForward target_lengths(const Performer& performer, double limit) {
   };
 }
 
-Replay run(const Performer& performer, const physics::Scene& plant, const FeedForward& feed_forward, double limit,
-           const ReplayOptions& options, const NominalPath* path = nullptr) {
-  std::optional<physics::Scene> without_obstacles;
-  if (!performer.scene.obstacles.empty()) without_obstacles.emplace(performer.scene).obstacles.clear();
-  const physics::Scene& model = without_obstacles ? *without_obstacles : performer.scene;
-  const ReplayInput input{plant,        model,                 performer.prepared,
-                          performer.muscles, feed_forward,     performer.clip_points,
-                          performer.scene.contact_points, performer.clip_rise, performer.length,
-                          performer.size, limit, path};
-  ReplayOptions in_world = options;
-  in_world.pushes.insert(in_world.pushes.end(), performer.world.pushes.begin(), performer.world.pushes.end());
-  in_world.moves = performer.world.moves;
-  return replay(input, in_world);
+/// The options with what the performer's world does to it.
+ReplayOptions in_world(const Performer& performer, const ReplayOptions& options) {
+  ReplayOptions result = options;
+  result.pushes.insert(result.pushes.end(), performer.world.pushes.begin(), performer.world.pushes.end());
+  result.moves = performer.world.moves;
+  return result;
+}
+
+std::optional<physics::Scene> without_obstacles(const physics::Scene& scene) {
+  if (scene.obstacles.empty()) return std::nullopt;
+  std::optional<physics::Scene> result(scene);
+  result->obstacles.clear();
+  return result;
 }
 
 /// Whether what the creature goes through is what its clip was solved for.
@@ -75,7 +75,7 @@ bool is_as_planned(const Performer& performer, const ReplayOptions& options) {
 }
 
 /// One of kTrials, by the options' feedback.
-Replay run_trial(const Trial& trial, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+Replay run_trial(const Trial& trial, const Act& act, const PerformOptions& options) {
   ReplayOptions shoved = options.replay;
   shoved.correct = true;
   shoved.trace = false;
@@ -83,7 +83,7 @@ Replay run_trial(const Trial& trial, const Performer& performer, const SignalSet
   shoved.corrector = with(options.feedback, options.replay.corrector);
   Push& shove = shoved.pushes.emplace_back();
   shove.delta_v = kTrialShove * Eigen::Vector3d(std::cos(trial.angle), 0, std::sin(trial.angle));
-  return run(performer, varied_scene(performer.scene, trial.body), signals_of(signals), signals.limit, shoved, &performer.path);
+  return act.run(varied_scene(act.performer().scene, trial.body), shoved);
 }
 
 Lapse lapse_of(double straying) {
@@ -98,37 +98,37 @@ bool is_lost(const Performer& performer, const PerformOptions& options, const Re
 }
 
 /// The `first` of kTrials and the next, side by side.
-std::array<Replay, 2> run_pair(std::size_t first, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  const auto go = [&](std::size_t k) { return run_trial(kTrials[k], performer, signals, options); };
+std::array<Replay, 2> run_pair(std::size_t first, const Act& act, const PerformOptions& options) {
+  const auto go = [&](std::size_t k) { return run_trial(kTrials[k], act, options); };
   auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, first);
   Replay second = go(first + 1);
   return {beside.get(), std::move(second)};
 }
 
 /// How many of these are lost.
-int pair_lost(std::size_t first, const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  const std::array<Replay, 2> runs = run_pair(first, performer, signals, options);
-  return static_cast<int>(std::count_if(runs.begin(), runs.end(), [&](const Replay& run) { return is_lost(performer, options, run); }));
+int pair_lost(std::size_t first, const Act& act, const PerformOptions& options) {
+  const std::array<Replay, 2> runs = run_pair(first, act, options);
+  return static_cast<int>(std::count_if(runs.begin(), runs.end(), [&](const Replay& run) { return is_lost(act.performer(), options, run); }));
 }
 
 /// Where the planned body keeps its way and heavy ones, which of our clips are lost first, do not: the regulator on which fewest of
 /// kTrials are lost, if those are fewer.
-void keep_more_bodies(const Performer& performer, const SignalSet& signals, const PerformOptions& options, Performances& result) {
+void keep_more_bodies(const Act& act, const PerformOptions& options, Performances& result) {
   PerformOptions on_trial = options, other = options;
   on_trial.replay.duration_s = std::min(options.replay.duration_s, kLookSeconds);
   other.baselines = false;
-  result.trials_lost = pair_lost(0, performer, signals, on_trial);
-  if (result.trials_lost > 0) result.trials_lost += pair_lost(2, performer, signals, on_trial);
+  result.trials_lost = pair_lost(0, act, on_trial);
+  if (result.trials_lost > 0) result.trials_lost += pair_lost(2, act, on_trial);
   for (const Feedback& feedback : kOthers) {
     if (feedback.regulator == 0 || feedback == options.feedback) continue;  // others are for feet that the usual gain shakes loose
     on_trial.feedback = other.feedback = feedback;
     int lost = 0;
     for (std::size_t first = 0; first < kTrials.size() && lost < result.trials_lost; first += 2) {
-      lost += pair_lost(first, performer, signals, on_trial);
+      lost += pair_lost(first, act, on_trial);
     }
     if (lost >= result.trials_lost) continue;
-    Performances next = perform(performer, signals, other);
-    if (straying(performer, options.replay, next.main()) > 1) continue;
+    Performances next = perform(act, other);
+    if (straying(act.performer(), options.replay, next.main()) > 1) continue;
     result.trials_lost = lost;
     result.closed_loop = std::move(next.closed_loop);
     result.feedback = feedback;
@@ -136,6 +136,32 @@ void keep_more_bodies(const Performer& performer, const SignalSet& signals, cons
 }
 
 }  // namespace
+
+Act::Act(const Performer& performer, const SignalSet& signals)
+    : performer_(performer),
+      signals_(signals),
+      without_obstacles_(without_obstacles(performer.scene)),
+      model_(without_obstacles_ ? *without_obstacles_ : performer.scene),
+      costs_({model_, performer.muscles, performer.prepared, performer.path, signals_of(signals), performer.length}) {}
+
+ReplayInput Act::input(const physics::Scene& plant) const {
+  return {plant, model_, performer_.prepared, performer_.muscles, {}, performer_.clip_points, performer_.scene.contact_points,
+          performer_.clip_rise, performer_.length, performer_.size, signals_.limit};
+}
+
+Replay Act::run(const physics::Scene& plant, const ReplayOptions& options) const {
+  ReplayInput by_signals = input(plant);
+  by_signals.feed_forward = signals_of(signals_);
+  by_signals.path = &performer_.path;
+  by_signals.costs = &costs_;
+  return replay(by_signals, in_world(performer_, options));
+}
+
+Replay Act::run_naively(const physics::Scene& plant, const ReplayOptions& options) const {
+  ReplayInput by_lengths = input(plant);
+  by_lengths.feed_forward = target_lengths(performer_, signals_.limit);
+  return replay(by_lengths, in_world(performer_, options));
+}
 
 Variation variation_of(unsigned seed, double most) {
   if (seed == 0) return {};
@@ -161,26 +187,29 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
   return varied;
 }
 
-Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  const physics::Scene plant = varied_scene(performer.scene, variation_of(options.seed, options.variation));
+Performances perform(const Act& act, const PerformOptions& options) {
+  const physics::Scene plant = varied_scene(act.performer().scene, variation_of(options.seed, options.variation));
   ReplayOptions baseline = options.replay;
   baseline.correct = baseline.trace = false;
   baseline.lesson = nullptr;
   Performances result;
   const auto run_baselines = [&] {
     if (!options.baselines) return;
-    result.naive = run(performer, plant, target_lengths(performer, signals.limit), signals.limit, baseline);
-    if (options.closed_loop) result.open_loop = run(performer, plant, signals_of(signals), signals.limit, baseline, &performer.path);
+    result.naive = act.run_naively(plant, baseline);
+    if (options.closed_loop) result.open_loop = act.run(plant, baseline);
   };
   auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, run_baselines);
   ReplayOptions main = options.replay;
   main.correct = options.closed_loop;
   main.corrector = with(options.feedback, options.replay.corrector);
   result.feedback = options.feedback;
-  (options.closed_loop ? result.closed_loop : result.open_loop) = 
-      run(performer, plant, signals_of(signals), signals.limit, main, &performer.path);
+  (options.closed_loop ? result.closed_loop : result.open_loop) = act.run(plant, main);
   beside.get();
   return result;
+}
+
+Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  return perform(Act(performer, signals), options);
 }
 
 double straying(const Performer& performer, const ReplayOptions& options, const Replay& run) {
@@ -200,25 +229,30 @@ Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const R
   return lapse_of(straying(performer, options, run));
 }
 
-TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options) {
   static_assert(kTrials.size() % 2 == 0, "they go in pairs");
   TrialsOutcome result;
   for (std::size_t first = 0; first < kTrials.size(); first += 2) {
-    for (const Replay& run : run_pair(first, performer, signals, options)) {
-      if (is_lost(performer, options, run)) ++result.lost;
+    for (const Replay& run : run_pair(first, act, options)) {
+      if (is_lost(act.performer(), options, run)) ++result.lost;
       result.shape_rms_length += run.report.shape_rms_length / static_cast<double>(kTrials.size());
     }
   }
   return result;
 }
 
-Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  Performances result = perform(performer, signals, options);
+TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  return go_on_trials(Act(performer, signals), options);
+}
+
+Performances perform_steadily(const Act& act, const PerformOptions& options) {
+  Performances result = perform(act, options);
   if (!options.closed_loop) return result;
+  const Performer& performer = act.performer();
   double least = straying(performer, options.replay, result.main());
   result.wished_lapse = lapse_of(least);
   if (least <= 1) {
-    if (options.is_thorough) keep_more_bodies(performer, signals, options, result);
+    if (options.is_thorough) keep_more_bodies(act, options, result);
     return result;
   }
   PerformOptions other = options;
@@ -228,10 +262,10 @@ Performances perform_steadily(const Performer& performer, const SignalSet& signa
     if (is_well && result.trials_lost == 0) break;
     if (feedback == options.feedback || (feedback.regulator > 0 && !options.is_thorough)) continue;
     other.feedback = feedback;
-    Performances next = perform(performer, signals, other);
+    Performances next = perform(act, other);
     const double its = straying(performer, options.replay, next.main());
     if (its > 1 && (is_well || its >= kBetter * least)) continue;
-    const int lost = its <= 1 && options.is_thorough ? go_on_trials(performer, signals, other).lost : 0;
+    const int lost = its <= 1 && options.is_thorough ? go_on_trials(act, other).lost : 0;
     if (is_well && lost >= result.trials_lost) continue;
     least = its;
     result.trials_lost = lost;
@@ -240,6 +274,10 @@ Performances perform_steadily(const Performer& performer, const SignalSet& signa
   }
   result.lapse = lapse_of(least);
   return result;
+}
+
+Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
+  return perform_steadily(Act(performer, signals), options);
 }
 
 double substep_error(const Performer& performer, const SignalSet& signals, const ReplayOptions& options) {
@@ -252,8 +290,8 @@ double substep_error(const Performer& performer, const SignalSet& signals, const
   ReplayOptions fine = coarse;
   fine.step_s = options.step_s / halves;
   fine.steps_per_control = options.steps_per_control * halves;
-  const Replay a = run(performer, performer.scene, signals_of(signals), signals.limit, coarse, &performer.path);
-  const Replay b = run(performer, performer.scene, signals_of(signals), signals.limit, fine, &performer.path);
+  const Act act(performer, signals);
+  const Replay a = act.run(performer.scene, coarse), b = act.run(performer.scene, fine);
   const Eigen::Index frames = std::min(a.motion.count(), b.motion.count());
   const double nodes = static_cast<double>(a.motion.frames.rows()) / 3 * static_cast<double>(frames);
   return (a.motion.frames.leftCols(frames) - b.motion.frames.leftCols(frames)).norm() / std::sqrt(nodes) / performer.length;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "retarget/control_mesh.h"
+#include "retarget/cost_source.h"
 #include "retarget/feedback.h"
 #include "retarget/morphs.h"
 #include "retarget/nominal_path.h"
@@ -33,6 +34,32 @@ struct Performer {
   double length = 1, size = 1;  // L and D [m]
   std::string self_contact_reason = "nobody asked for it";  // why the scene has it or not
   World world = {};  // around it, beside what the scene has
+};
+
+/// A performer with its signals, to be let go again and again: what all of its runs would find alike is found once, when it is needed, and
+/// kept as long as this lives. Both must outlive it and stay as they are. Runs may go side by side.
+class Act {
+ public:
+  Act(const Performer& performer, const SignalSet& signals);
+  Act(const Act&) = delete;
+  Act& operator=(const Act&) = delete;
+
+  const Performer& performer() const { return performer_; }
+  /// Lets a body of the performer's shape go, by the signals, as the options have it but in the performer's world.
+  Replay run(const physics::Scene& plant, const ReplayOptions& options) const;
+  /// Likewise by the target's lengths as rest lengths.
+  Replay run_naively(const physics::Scene& plant, const ReplayOptions& options) const;
+  /// How often a regulator's cost to go was found.
+  int costs_found() const { return costs_.times_found(); }
+
+ private:
+  ReplayInput input(const physics::Scene& plant) const;
+
+  const Performer& performer_;
+  const SignalSet& signals_;
+  const std::optional<physics::Scene> without_obstacles_;  // where the performer's scene has some: the corrector's model knows of none
+  const physics::Scene& model_;
+  const CostSource costs_;
 };
 
 /// Which free runs are wanted, and how.
@@ -89,6 +116,7 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 
 /// Lets the creature go as often as wanted, on the same body, contact and solver, with the pushes of its world beside those of the
 /// options. The signals play from their coefficients with all layers. The corrector's model knows of no obstacles.
+Performances perform(const Act& act, const PerformOptions& options);
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// How far a run is off the clip's way, in units of what loses it (lapse_of); infinite where it is down.
@@ -106,6 +134,7 @@ struct TrialsOutcome {
   double shape_rms_length = 0;  // as in ReplayReport, the mean of all, as long as they went
 };
 /// Lets kTrials go by the options' feedback, as long as the options have it.
+TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options);
 TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, where the options
@@ -114,6 +143,7 @@ TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals,
 /// that on which fewest are, and where the body keeps its way on what was wished but heavy ones of kTrials do not, the regulators are tried
 /// likewise. Where none keeps the body on its way, what stays up and strays least, the earlier one unless a later
 /// strays less than half as far. On some bodies, coarse ones above all, a gain that others need shakes the feet loose.
+Performances perform_steadily(const Act& act, const PerformOptions& options);
 Performances perform_steadily(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
 /// How far [m per L, RMS over the nodes and the frames of at most one period or second] the open loop moves when the solver's

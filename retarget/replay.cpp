@@ -1,6 +1,7 @@
 #include "retarget/replay.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -8,6 +9,7 @@
 
 #include "physics/effect.h"
 #include "retarget/contact_loads.h"
+#include "retarget/cost_source.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/divergence.h"
 #include "retarget/fall.h"
@@ -64,12 +66,15 @@ CorrectorOptions regulated(CorrectorOptions gain, const ReplayOptions& options) 
 }
 
 /// None where nothing is to be regulated, or cannot be.
-std::shared_ptr<const CostToGo> cost_for(const ReplayInput& input, const ReplayOptions& options, double control_s) {
-  if (!options.correct || options.corrector.regulator.reach == 0) return nullptr;
+std::shared_ptr<const CostToGo> cost_for(const ReplayInput& input, const ReplayOptions& options) {
+  const RegulatorOptions& regulator = options.corrector.regulator;
+  if (!options.correct || regulator.reach == 0) return nullptr;
+  if (input.costs) {
+    assert(input.costs->is_of(input.model, input.muscles, input.prepared, input.path));
+    return input.costs->cost(control_step(options), regulator);
+  }
   const NominalPath path = path_of(input);
-  const RegulatedMotion motion{input.model, input.muscles, input.prepared, path, input.feed_forward, input.length};
-  const auto cost = std::make_shared<const CostToGo>(find_cost_to_go(motion, control_s, options.corrector.regulator));
-  return cost->is_sound() ? cost : nullptr;
+  return CostSource({input.model, input.muscles, input.prepared, path, input.feed_forward, input.length}).cost(control_step(options), regulator);
 }
 
 std::optional<physics::Scene> moving_plant(const ReplayInput& input, const ReplayOptions& options) {
@@ -79,7 +84,7 @@ std::optional<physics::Scene> moving_plant(const ReplayInput& input, const Repla
 /// One free simulation, from control step to control step.
 class Run {
  public:
-  Run(const ReplayInput& input, const ReplayOptions& options) : Run(input, options, cost_for(input, options, control_step(options))) {}
+  Run(const ReplayInput& input, const ReplayOptions& options) : Run(input, options, cost_for(input, options)) {}
   Replay play();
 
  private:

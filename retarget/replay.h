@@ -13,6 +13,7 @@
 
 namespace hydrostat::retarget {
 
+class CostSource;
 struct Lesson;
 struct NominalPath;
 
@@ -43,6 +44,7 @@ struct ReplayInput {
   double clip_rise = 0;                   // [m] of the centre of mass of the imported clip: apex_rise of its com_path
   double length = 1, size = 1, limit = 0.3;
   const NominalPath* path = nullptr;      // where the feed-forward takes the body; none: to the target
+  const CostSource* costs = nullptr;      // of the model, muscles, target, path and signals that are here; none: a regulator's cost is found anew
 };
 
 /// Time courses of one replay, one entry a control step.

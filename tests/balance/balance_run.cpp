@@ -169,8 +169,8 @@ int run(int argc, char** argv) {
   const double angle = 2 * M_PI * static_cast<double>(random()) / 4294967296.0;
   if (seed != 0) options.replay.pushes.push_back(shove(0, angle, kFirstShove * static_cast<double>(random()) / 4294967296.0));
   if (push != "none") options.replay.pushes.push_back(parse_push(push, target));
-  const auto& let_go = nodes > 0 ? retarget::perform_steadily : retarget::perform;
-  const retarget::Replay replay = *let_go(performer, creature.signals, options).closed_loop;
+  const retarget::Act act(performer, creature.signals);
+  const retarget::Replay replay = *(nodes > 0 ? perform_steadily(act, options) : perform(act, options)).closed_loop;
   const retarget::ReplayReport& r = replay.report;
   const double travel = r.clip_travel_per_cycle_length > 0.01 ? r.travel_per_cycle_length / r.clip_travel_per_cycle_length : 1;
   std::string cause = r.fall_cause;

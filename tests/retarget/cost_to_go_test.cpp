@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <future>
 #include <random>
 
 #include "retarget/contact_loads.h"
+#include "retarget/cost_source.h"
 #include "retarget/linear_step.h"
 #include "retarget/muscle_response.h"
 #include "retarget/replay.h"
@@ -299,6 +301,61 @@ TEST(CostToGo, OfALoopReturnsAndOfAOneShotStands) {
   const CostToGo once = find_cost_to_go(box.motion(), kStep, options);
   EXPECT_EQ(once.at(period), once.at(5 * period));
   EXPECT_NE(once.at(0), once.at(period));
+}
+
+RegulatorOptions reaching(double reach) {
+  RegulatorOptions options;
+  options.modes = 30;
+  options.reach = reach;
+  return options;
+}
+
+TEST(CostSource, IsFoundOnceWhoeverAsksAndHoweverFarARegulatorReaches) {
+  Regulated box;
+  const CostSource costs(box.motion());
+  EXPECT_EQ(costs.times_found(), 0) << "nobody asked";
+  auto beside = std::async(std::launch::async, [&] { return costs.cost(kStep, reaching(1e-3)); });
+  const std::shared_ptr<const CostToGo> cost = costs.cost(kStep, reaching(1));
+  ASSERT_NE(cost, nullptr);
+  EXPECT_EQ(beside.get(), cost);
+  EXPECT_EQ(costs.cost(kStep, reaching(1e-2)), cost);
+  EXPECT_EQ(costs.times_found(), 1);
+}
+
+TEST(CostSource, IsFoundAnewForOtherSettingsAndAsByAnyoneElse) {
+  Regulated box;
+  const CostSource costs(box.motion());
+  RegulatorOptions other[6];
+  for (RegulatorOptions& options : other) options = reaching(1);
+  other[1].modes = 20;
+  other[2].place = 2;
+  other[3].speed = 0.2;
+  other[4].effort = 1e-2;
+  other[5].last = 0.2;
+  int times = 0;
+  for (const double step_s : {kStep, kStep / 2}) {
+    for (const RegulatorOptions& options : other) {
+      SCOPED_TRACE(++times);
+      const std::shared_ptr<const CostToGo> cost = costs.cost(step_s, options);
+      const CostToGo alone = find_cost_to_go(box.motion(), step_s, options);
+      EXPECT_EQ(cost->at(0.05), alone.at(0.05));
+      EXPECT_EQ(cost->at_disturbed(0.05), alone.at_disturbed(0.05));
+      EXPECT_EQ(costs.times_found(), times);
+    }
+  }
+  costs.cost(kStep, other[5]);
+  EXPECT_EQ(costs.times_found(), times + 1) << "another control step alone";
+}
+
+TEST(CostSource, KnowsItsMotion) {
+  Regulated box, twin;
+  const CostSource costs(box.motion());
+  const Performer &own = box.performer, &other = twin.performer;
+  EXPECT_TRUE(costs.is_of(own.scene, own.muscles, own.prepared, &own.path));
+  EXPECT_FALSE(costs.is_of(other.scene, own.muscles, own.prepared, &own.path));
+  EXPECT_FALSE(costs.is_of(own.scene, other.muscles, own.prepared, &own.path));
+  EXPECT_FALSE(costs.is_of(own.scene, own.muscles, other.prepared, &own.path));
+  EXPECT_FALSE(costs.is_of(own.scene, own.muscles, own.prepared, nullptr));
 }
 
 /// The same deviation in a world that is turned about the vertical is answered by the same muscles.

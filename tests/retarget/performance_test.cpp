@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
 
 #include "tests/retarget/box_performer.h"
 
@@ -146,6 +148,71 @@ TEST(PerformSteadily, TakesARegulatorWhereThePlannedBodyIsWellAndThoseOffThePlan
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
   EXPECT_TRUE(steady.naive && steady.open_loop);
   EXPECT_TRUE(steady.main().motion.frames == perform_by(kInTurn[0], performer, signals, options).main().motion.frames);
+}
+
+/// A run by the performer's signals that knows of no other.
+Replay run_alone(const Performer& performer, const SignalSet& signals, const physics::Scene& plant, ReplayOptions options,
+                 const Feedback& feedback) {
+  options.corrector = with(feedback, options.corrector);
+  const auto player = std::make_shared<signal::Synthesiser>(activations(signals));
+  const auto play = [player](double time_s, Eigen::VectorXd& activation) { player->at(time_s, activation); };
+  return replay({plant, performer.scene, performer.prepared, performer.muscles, play, performer.clip_points, performer.scene.contact_points,
+                 performer.clip_rise, performer.length, performer.size, signals.limit, &performer.path},
+                options);
+}
+
+int trials_lost_alone(const Performer& performer, const SignalSet& signals, const ReplayOptions& options, const Feedback& feedback) {
+  return static_cast<int>(std::count_if(kTrials.begin(), kTrials.end(), [&](const Trial& trial) {
+    ReplayOptions shoved = options;
+    shoved.pushes.push_back({.delta_v = kTrialShove * Eigen::Vector3d(std::cos(trial.angle), 0, std::sin(trial.angle))});
+    return run_alone(performer, signals, varied_scene(performer.scene, trial.body), shoved, feedback).report.fell;
+  }));
+}
+
+/// Three regulators may be tried on five bodies, two of them side by side.
+TEST(PerformSteadily, FindsTheCostToGoOnceAndGoesByItAsEachRunDoesByItsOwn) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  int regulated = 0;
+  for (const double delay_s : {0.06, 0.09}) {  // the planned body is well; it falls
+    SCOPED_TRACE(delay_s);
+    PerformOptions options = lasting(1.5);
+    options.replay.observation.delay_s = delay_s;
+    options.baselines = false;
+    const Act usual(performer, signals), searched(performer, signals);
+    perform_steadily(usual, options);
+    EXPECT_EQ(usual.costs_found(), 0) << "no regulator was tried";
+
+    options.is_thorough = true;
+    const Performances steady = perform_steadily(searched, options);
+    EXPECT_EQ(searched.costs_found(), 1);
+    if (steady.feedback.regulator > 0) ++regulated;
+    EXPECT_EQ(steady.main().motion.frames, run_alone(performer, signals, performer.scene, options.replay, steady.feedback).motion.frames);
+    EXPECT_EQ(steady.trials_lost, trials_lost_alone(performer, signals, options.replay, steady.feedback));
+  }
+  EXPECT_GE(regulated, 1) << "nothing went by what was found";
+}
+
+/// Whichever of its bodies went first.
+TEST(Act, GoesByTheCostToGoOfItsPlanOnWhateverBody) {
+  const Performer plain = make_box_performer();
+  Performer performer = plain;
+  performer.scene.obstacles.push_back({.shape = physics::Ball{0.1}, .place = {5, 0, 0}});  // which no model knows
+  const SignalSet signals = signals_of(performer);
+  ReplayOptions options = lasting(0.3).replay;
+  options.corrector = with({.regulator = 1}, options.corrector);
+  const Act act(performer, signals);
+  const physics::Scene light = varied_scene(performer.scene, {0.8, 1, 1.2});
+  const Replay of_light = act.run(light, options), of_plan = act.run(performer.scene, options);
+  EXPECT_EQ(of_light.motion.frames, run_alone(plain, signals, light, options, {}).motion.frames);
+  EXPECT_EQ(of_plan.motion.frames, run_alone(plain, signals, performer.scene, options, {}).motion.frames);
+  EXPECT_NE(of_light.motion.frames, of_plan.motion.frames);
+  EXPECT_EQ(act.costs_found(), 1);
+  options.steps_per_control *= 2;
+  EXPECT_EQ(act.run(light, options).motion.frames, run_alone(plain, signals, light, options, {}).motion.frames);
+  EXPECT_EQ(act.costs_found(), 2) << "another control step is another cost";
+  act.run_naively(light, lasting(0.1).replay);
+  EXPECT_EQ(act.costs_found(), 2);
 }
 
 /// A level of detail has no time for trials, nor for regulators.

@@ -13,6 +13,8 @@
 #include <system_error>
 
 #include "io/creature_record.h"
+#include "io/link_or_copy.h"
+#include "io/obj_out.h"
 #include "io/write_file.h"
 
 namespace hydrostat::io {
@@ -21,10 +23,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 22> kOwnFiles{
+constexpr std::array<std::string_view, 21> kOwnFiles{
     "creature.toml",  "scene.toml", "body.json",  "target.bin",  "path.bin",     "rig.bin",     "appearance.bin", "morphs.bin", "wobble.bin",
     "signals.json", "reference.glb", "replay.glb", "failed.glb", "report.json", "report.html", "accuracy.csv", "accuracy.svg",
-    "replay.pc2", "replay.mdd", "replay.obj", "replay.mtl", "replay_obj"};
+    "replay.pc2", "replay.mdd", "replay.obj", "replay.mtl"};
+constexpr const char* kFrames = "replay_obj";  // a directory, in which only frames are ours
+constexpr const char* kFrameName = "replay";
 
 Error directory_error(const fs::path& shown_as, int error_number) {
   return {shown_as.string(), "", std::string("the directory cannot be written: ") + std::strerror(error_number),
@@ -108,15 +112,6 @@ void refuse_what_is_no_creature(const fs::path& creature, const fs::path& shown_
   }
 }
 
-/// Copies a file or a directory by hard links, which cost neither time nor room; by bytes where the file system has none.
-void link_or_copy(const fs::path& from, const fs::path& to) {
-  using fs::copy_options;
-  constexpr copy_options kWhole = copy_options::recursive | copy_options::copy_symlinks | copy_options::skip_existing;
-  std::error_code failed;
-  fs::copy(from, to, kWhole | copy_options::create_hard_links, failed);
-  if (failed) fs::copy(from, to, kWhole);
-}
-
 /// Two directories change places in one step. 0 or errno.
 int exchange(const fs::path& one, const fs::path& other) {
   return renameat2(AT_FDCWD, one.c_str(), AT_FDCWD, other.c_str(), RENAME_EXCHANGE) == 0 ? 0 : errno;
@@ -168,7 +163,11 @@ void CreatureWriter::carry_over(bool everything) {
     for (const fs::directory_entry& entry : fs::directory_iterator(creature_)) {
       const fs::path name = entry.path().filename();
       const bool own = std::find(kOwnFiles.begin(), kOwnFiles.end(), name.string()) != kOwnFiles.end();
-      if (everything || !own) link_or_copy(entry.path(), part_ / name);
+      if (!everything && name == kFrames) {
+        keep_others_than_obj_frames(entry.path(), kFrameName, part_ / name);
+      } else if (everything || !own) {
+        link_or_copy(entry.path(), part_ / name);
+      }
     }
   } catch (const fs::filesystem_error& error) {
     std::error_code ignored;
@@ -188,9 +187,15 @@ Error CreatureWriter::as_seen(const Error& error) const {
 }
 
 void CreatureWriter::remove(const std::string& name) {
-  std::error_code failed;
-  fs::remove_all(part_ / name, failed);
-  if (failed) throw directory_error(shown_as_ / name, failed.value());
+  try {
+    if (name == kFrames) {
+      remove_obj_frames(part_ / name, kFrameName);
+    } else {
+      fs::remove_all(part_ / name);
+    }
+  } catch (const fs::filesystem_error& error) {
+    throw directory_error(shown_as_ / name, error.code().value());
+  }
 }
 
 void CreatureWriter::commit() {

@@ -19,7 +19,7 @@ namespace hydrostat::io {
 class CreatureWriter {
  public:
   enum class Start {
-    afresh,  // a creature made anew: of the old one, the stage cache and what hydrostat did not write are kept
+    afresh,  // a creature made anew: of the old one, the stage cache and what hydrostat did not write are kept, in replay_obj too
     amended  // the old creature with all its files, some of which are about to be replaced; Error when there is none
   };
   enum class Kind { creature, simulation };
@@ -37,7 +37,7 @@ class CreatureWriter {
   void write(const std::string& name, std::string_view bytes);
   /// The same error with the creature's path where the file it names lies in `directory()`.
   Error as_seen(const Error& error) const;
-  /// Takes a file out of the creature, if it is there.
+  /// Takes a file out of the creature, if it is there; of the directory of frames (replay_obj) only frames.
   void remove(const std::string& name);
   /// Puts the new creature in the place of the old one. To be called once, last. Throws Error, and the old one stays.
   void commit();

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "io/link_or_copy.h"
 #include "io/writable.h"
 #include "io/write_error.h"
 #include "io/write_file.h"
@@ -169,9 +170,31 @@ void refuse_obj_frames(const fs::path& directory, const std::string& name) {
   for (const fs::directory_entry& entry : fs::directory_iterator(directory, ignored)) {
     if (is_of_frames(entry.path().filename().string(), name)) continue;
     throw Error(directory.string(), "--export obj", "holds '" + entry.path().filename().string() + "', which is none of its frames",
-                "Move it away, for the directory is replaced as a whole.");
+                "Move it away, or give another file.");
   }
   refuse_unwritable(directory.parent_path());
+}
+
+void keep_others_than_obj_frames(const fs::path& directory, const std::string& name, const fs::path& to) {
+  if (!fs::is_directory(fs::symlink_status(directory))) return;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory)) {
+    const fs::path file = entry.path().filename();
+    if (is_of_frames(file.string(), name)) continue;
+    fs::create_directories(to);
+    link_or_copy(entry.path(), to / file);
+  }
+}
+
+void remove_obj_frames(const fs::path& directory, const std::string& name) {
+  if (!fs::is_directory(fs::symlink_status(directory))) {
+    fs::remove(directory);
+    return;
+  }
+  const std::vector<fs::directory_entry> entries(fs::directory_iterator(directory), fs::directory_iterator{});
+  for (const fs::directory_entry& entry : entries) {
+    if (is_of_frames(entry.path().filename().string(), name)) fs::remove_all(entry.path());
+  }
+  if (fs::is_empty(directory)) fs::remove(directory);
 }
 
 void write_obj_frames(const fs::path& directory, const std::string& name, Eigen::Index frames,
@@ -186,6 +209,7 @@ void write_obj_frames(const fs::path& directory, const std::string& name, Eigen:
       const std::string file = name + "_" + number_of(f, digits) + ".obj";
       write_file(part / file, text_at(f), directory / file);
     }
+    keep_others_than_obj_frames(directory, name, part);
     fs::remove_all(directory);
     fs::rename(part, directory);
   } catch (const fs::filesystem_error& failure) {

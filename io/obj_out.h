@@ -46,11 +46,17 @@ class ObjSkin {
 };
 
 /// Writes one OBJ file a frame, <name>_0001.obj and so on, and <name>.mtl into a directory, which takes the place of the old
-/// one when it is whole. text_at: of frames from 0 on, which name the file <name>.mtl. Throws Error where that cannot be.
+/// one when it is whole, and has its other files. text_at: of frames from 0 on, which name the file <name>.mtl. Throws Error where that cannot be.
 void write_obj_frames(const std::filesystem::path& directory, const std::string& name, Eigen::Index frames,
                       const std::function<std::string(Eigen::Index)>& text_at, const std::string& material_text);
 
 /// Throws Error where write_obj_frames may not replace or cannot make the directory: it holds anything but its frames, or is a file.
 void refuse_obj_frames(const std::filesystem::path& directory, const std::string& name);
+
+/// Gives `to` all that lies in a directory and has no name that write_obj_frames gives, as link_or_copy does; `to` is made where that is
+/// anything. Throws std::filesystem::filesystem_error.
+void keep_others_than_obj_frames(const std::filesystem::path& directory, const std::string& name, const std::filesystem::path& to);
+/// Removes what has such a name, and the directory where that was all; a symbolic link alone where it is one. Throws likewise.
+void remove_obj_frames(const std::filesystem::path& directory, const std::string& name);
 
 }  // namespace hydrostat::io

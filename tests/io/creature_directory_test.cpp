@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "io/creature_record.h"
+#include "io/obj_out.h"
 #include "io/write_file.h"
 #include "tests/io/refusal.h"
 #include "tests/io/temporary_directory.h"
@@ -77,6 +78,46 @@ TEST(CreatureWriter, KeepsTheCacheAndTheUsersFilesAndNoOldResults) {
   EXPECT_EQ(directory.count(), 1U);
 }
 
+/// In the directory of frames too, by whichever way these go.
+TEST(CreatureWriter, KeepsTheUsersFilesAmongFrames) {
+  const char* const mine[] = {"mine.obj", "replay_0001.blend", "replay_1.obj", "other_0001.obj", "render/replay_0001.obj"};
+  const char* const frames[] = {"replay_0001.obj", "replay_0012.obj", "replay.mtl"};
+  const auto frame = [](Eigen::Index) { return std::string("new"); };
+  for (const Start start : {Start::afresh, Start::amended}) {
+    for (const bool exported_anew : {false, true}) {
+      const TemporaryDirectory directory;
+      const fs::path creature = directory.path / "trot", place = creature / "replay_obj";
+      make_creature(creature, "old");
+      for (const char* name : mine) write_file(place / name, "mine");
+      for (const char* name : frames) write_file(place / name, "old");
+      {
+        CreatureWriter writer(creature, start);
+        writer.write("creature.toml", "new");
+        writer.remove("replay_obj");
+        if (exported_anew) write_obj_frames(writer.directory() / "replay_obj", "replay", 1, frame, "new");
+        for (const char* name : frames) EXPECT_EQ(read_file(place / name), "old");
+        writer.commit();
+      }
+      for (const char* name : mine) EXPECT_EQ(read_file(place / name), "mine") << name;
+      for (const char* name : frames) EXPECT_EQ(fs::exists(place / name), exported_anew && name != frames[1]) << name;
+      EXPECT_TRUE(!exported_anew || read_file(place / "replay_0001.obj") == "new");
+    }
+  }
+}
+
+TEST(CreatureWriter, TakesADirectoryOfFramesThatIsALinkForALink) {
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "trot";
+  make_creature(creature, "old");
+  write_file(directory.path / "elsewhere" / "replay_0001.obj", "old");
+  fs::create_directory_symlink(directory.path / "elsewhere", creature / "replay_obj");
+  CreatureWriter writer(creature, Start::amended);
+  writer.remove("replay_obj");
+  writer.commit();
+  EXPECT_FALSE(fs::exists(fs::symlink_status(creature / "replay_obj")));
+  EXPECT_EQ(read_file(directory.path / "elsewhere" / "replay_0001.obj"), "old");
+}
+
 TEST(CreatureWriter, AmendsACreatureAllAtOnce) {
   const TemporaryDirectory directory;
   const fs::path creature = directory.path / "trot";
@@ -99,17 +140,19 @@ TEST(CreatureWriter, SurvivesBeingKilledAndCleansUpAfterTheDead) {
   const TemporaryDirectory directory;
   const fs::path creature = directory.path / "trot";
   make_creature(creature, "old");
-  const pid_t child = fork();
-  if (child == 0) {
-    auto* writer = new CreatureWriter(creature, Start::afresh);
-    writer->write("creature.toml", "half");
-    raise(SIGKILL);
+  for (const int signal : {SIGKILL, SIGINT, SIGTERM}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      auto* writer = new CreatureWriter(creature, Start::afresh);
+      writer->write("creature.toml", "half");
+      raise(signal);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status));
+    EXPECT_EQ(read_file(creature / "creature.toml"), "old");
+    EXPECT_EQ(directory.count(), 2U) << "what the one before left was cleaned up";
   }
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFSIGNALED(status));
-  EXPECT_EQ(read_file(creature / "creature.toml"), "old");
-  EXPECT_EQ(directory.count(), 2U);
   make_creature(creature, "new");
   EXPECT_EQ(read_file(creature / "creature.toml"), "new");
   EXPECT_EQ(directory.count(), 1U);

@@ -12,6 +12,9 @@ namespace {
 constexpr double kFaster = 1.25;  // kinetic energy over that at the start and the work [-]: less is not looked into
 constexpr double kCalm = 0.01;    // of the energy of a body as fast as push_out_speed: less is never too much
 constexpr int kMostHalvings = 6;  // of euler's step where its solver finds no end
+// Near the bound of stability energy may grow unseen before it is too much: once it was, less is.
+constexpr double kWary = 0.5;           // [s] for which substeps stay as short as a step needed
+constexpr double kWarilyGrown = 0.002;  // of the energy [-] in a step, where shorter substeps are left to be tried
 
 /// An accurate method with euler behind it: sound steps are the accurate method's own, to the bit.
 ///
@@ -32,7 +35,8 @@ class GuardedStepper final : public StepperOf<Dim> {
         start_{scene.body.rest, scene.body.rest},
         part_(make_impulses(scene)),
         place_(scene.body.rest),
-        calm_energy_(kCalm * 0.5 * scene.body.mass.sum() * std::pow(push_out_speed(scene), 2)) {}
+        calm_energy_(kCalm * 0.5 * scene.body.mass.sum() * std::pow(push_out_speed(scene), 2)),
+        has_substeps_(accurate_->shorten(1)) {}
 
   double substep(double dt) const override { return accurate_->substep(dt); }
   long guard_steps() const override { return guard_steps_; }
@@ -42,6 +46,8 @@ class GuardedStepper final : public StepperOf<Dim> {
     if (euler_ != nullptr) euler_->forget();
     starts_unknown_ = true;
     is_guarding_ = false;
+    least_parts_ = 1;
+    wary_s_ = 0;
   }
 
   Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -49,12 +55,14 @@ class GuardedStepper final : public StepperOf<Dim> {
     start_ = state;
     const bool is_broken = (euler_ != nullptr && euler_->is_recovering()) || (starts_unknown_ && has_inverted(state.x));
     starts_unknown_ = false;
-    for (int parts = 1; !is_broken && parts <= (is_guarding_ ? 1 : options_.most_parts); parts *= 2) {
-      if (parts > 1) accurate_->forget();
-      const double passes = accurate_->work().passes;
+    const int most_parts = is_guarding_ ? least_parts_ : options_.most_parts;
+    for (int parts = least_parts_; !is_broken && parts <= most_parts; parts *= 2) {
+      if (parts > least_parts_) accurate_->forget();
+      const double passes = accurate_->work().passes, growth = is_wary() && parts < most_parts ? kWarilyGrown : options_.growth;
       if (step_accurately(parts, dt, activation, effect_force, state, impulses) == Termination::kDone &&
-          is_sound(activation, state, impulses, dt / std::max(1.0, accurate_->work().passes - passes))) {
+          is_sound(activation, state, impulses, dt / std::max(1.0, accurate_->work().passes - passes), growth)) {
         is_guarding_ = false;
+        learn_from(parts, dt);
         return Termination::kDone;
       }
       state = start_;
@@ -63,6 +71,19 @@ class GuardedStepper final : public StepperOf<Dim> {
   }
 
  private:
+  bool is_wary() const { return wary_s_ > 0; }
+  /// That a step was sound in so many parts.
+  void learn_from(int parts, double dt) {
+    if (!has_substeps_) return;
+    if (parts > least_parts_) {
+      least_parts_ = parts;
+      wary_s_ = kWary;
+    } else if (is_wary() && (wary_s_ -= dt) <= 0 && least_parts_ > 1) {
+      least_parts_ /= 2;
+      wary_s_ = kWary;
+    }
+  }
+
   bool has_inverted(const PointsOf<Dim>& x) const {
     const BodyOf<Dim>& body = scene_.body;
     for (int t = 0; t < body.tet_count(); ++t) {
@@ -91,10 +112,8 @@ class GuardedStepper final : public StepperOf<Dim> {
 
   Termination step_accurately(int parts, double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force,
                               StateOf<Dim>& state, ImpulsesOf<Dim>& impulses) {
-    const bool has_substeps = accurate_->shorten(parts);
-    const Termination end = step_in_parts(*accurate_, has_substeps ? 1 : parts, dt, activation, effect_force, state, impulses);
-    accurate_->shorten(1);
-    return end;
+    if (has_substeps_) accurate_->shorten(parts);
+    return step_in_parts(*accurate_, has_substeps_ ? 1 : parts, dt, activation, effect_force, state, impulses);
   }
 
   /// From the step's start to `state` [J], of what comes from without.
@@ -139,14 +158,15 @@ class GuardedStepper final : public StepperOf<Dim> {
     return 2 * energy_after(behind) - 0.5 * (energy_after(behind - half) + energy_after(behind + half));
   }
 
-  bool is_sound(const Eigen::VectorXd& activation, const StateOf<Dim>& state, const ImpulsesOf<Dim>& impulses, double substep) {
+  bool is_sound(const Eigen::VectorXd& activation, const StateOf<Dim>& state, const ImpulsesOf<Dim>& impulses, double substep,
+                double growth) {
     const double before = kinetic_energy(start_), after = kinetic_energy(state);
     const double work = work_on_body(state, impulses);
     if (!std::isfinite(after) || has_inverted(state.x)) return false;
-    if (after <= kFaster * before + std::max(0.0, work) + calm_energy_) return true;
+    if (!is_wary() && after <= kFaster * before + std::max(0.0, work) + calm_energy_) return true;
     if (!forces_.set_activation(activation)) return false;
     const double gain = after + elastic_energy(state, substep) - before - elastic_energy(start_, substep);
-    return gain <= work + options_.growth * (before + forces_.elastic_energy(start_.x)) + calm_energy_;
+    return gain <= work + growth * (before + forces_.elastic_energy(start_.x)) + calm_energy_;
   }
 
   Termination take_over(double dt, const Eigen::VectorXd& activation, const PointsOf<Dim>* effect_force, StateOf<Dim>& state,
@@ -178,6 +198,9 @@ class GuardedStepper final : public StepperOf<Dim> {
   ImpulsesOf<Dim> part_;
   PointsOf<Dim> place_;  // [m]
   double calm_energy_;          // [J]
+  const bool has_substeps_;     // of its own, so that parts are shorter ones of these
+  int least_parts_ = 1;         // in which the next step is tried
+  double wary_s_ = 0;           // for which it stays so
   bool starts_unknown_ = true;  // whether the state from which the next step starts is sound
   bool is_guarding_ = false;    // the last step was euler's
   long guard_steps_ = 0;

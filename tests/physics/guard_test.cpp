@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -215,6 +216,53 @@ TEST(Guard, ShortensTheSubstepsOfABodyStrainedFarBeforeItGivesAStepToEuler) {
     if (run(*make_explicit_stepper(scene), state) > 1.05) ++unstable;
   }
   EXPECT_GT(unstable, 0);
+}
+
+/// Diverges where its substeps are longer than it is told to bear.
+class Touchy final : public StepperOf<2> {
+ public:
+  explicit Touchy(const SceneOf<2>& scene) : stepper_(make_explicit_stepper(scene)) {}
+  Termination step(double dt, const Eigen::VectorXd& activation, const PointsOf<2>* effect_force, StateOf<2>& state,
+                   ImpulsesOf<2>& impulses) override {
+    last = times_;
+    stepper_->step(dt, activation, effect_force, state, impulses);
+    return times_ < wants ? Termination::kDiverged : Termination::kDone;
+  }
+  bool shorten(int times) override { return times_ = times, stepper_->shorten(times); }
+  double substep(double dt) const override { return stepper_->substep(dt); }
+  StepWork work() const override { return stepper_->work(); }
+
+  int wants = 1, last = 0;
+
+ private:
+  std::unique_ptr<StepperOf<2>> stepper_;
+  int times_ = 1;
+};
+
+TEST(Guard, KeepsSubstepsShortForHalfASecondAndThenGoesBackByHalves) {
+  const SceneOf<2> scene = flying_bar();
+  const BodyOf<2>& body = scene.body;
+  auto owned = std::make_unique<Touchy>(scene);
+  Touchy& touchy = *owned;
+  const std::unique_ptr<StepperOf<2>> stepper = make_guarded_stepper<2>(scene, std::move(owned), {.growth = 8, .most_parts = 4});
+  ImpulsesOf<2> impulses = make_impulses(scene);
+  StateOf<2> state{body.rest, rigid_velocity<2>(body, body.rest, {1, 2}, SpinOf<2>(6))};
+  const int half_second = static_cast<int>(std::lround(0.5 / kDt));
+  std::vector<int> shorter;
+  for (int k = 0; k < 3 * half_second; ++k) {
+    touchy.wants = k == 10 ? 4 : 1;
+    ASSERT_EQ(stepper->step(kDt, passive(body), nullptr, state, impulses), Termination::kDone);
+    shorter.push_back(touchy.last);
+  }
+  EXPECT_EQ(std::count(shorter.begin(), shorter.begin() + 10, 1), 10);
+  EXPECT_TRUE(std::is_sorted(shorter.begin() + 10, shorter.end(), std::greater<>()));
+  EXPECT_NEAR(static_cast<double>(std::count(shorter.begin(), shorter.end(), 4)), half_second, 2);
+  EXPECT_NEAR(static_cast<double>(std::count(shorter.begin(), shorter.end(), 2)), half_second, 2);
+  EXPECT_EQ(shorter.back(), 1);
+  EXPECT_EQ(stepper->guard_steps(), 0);
+  touchy.wants = 8;
+  ASSERT_EQ(stepper->step(kDt, passive(body), nullptr, state, impulses), Termination::kDone);
+  EXPECT_EQ(stepper->guard_steps(), 1);
 }
 
 }  // namespace

@@ -18,6 +18,9 @@ constexpr double kWarilyGrown = 0.002;  // of the energy [-] in a step, where sh
 
 /// An accurate method with euler behind it: sound steps are the accurate method's own, to the bit.
 ///
+/// What is unsound is first tried again in shorter steps of the accurate method. Its substeps, if it has any, then stay short for a
+/// while, or the instability that they cured would grow again, unseen until it is large, whenever they were let go.
+///
 /// What takes over is the whole step, not a blend of both: backward Euler damps, finds back from inverted and collapsed
 /// shapes and keeps linear momentum. What angular momentum it loses in flight, a fault of its
 /// own, a turn of the whole body gives back (ImpulsesOf::correction_nodes), as far as the energy that it took away reaches; a

@@ -186,7 +186,8 @@ void name_fields(RecordArchive& archive, retarget::PreparationReport& report) {
 
 void name_fields(RecordArchive& archive, retarget::PreparedTarget& prepared) {
   archive.fields("target", prepared.target, "contacts", prepared.contacts, "missing_wrench", prepared.missing_wrench,
-                 "mass_shares", prepared.mass_shares, "stiffness", prepared.stiffness, "support_friction", prepared.support_friction, "firmness", prepared.firmness, "report",
+                 "mass_shares", prepared.mass_shares, "stiffness", prepared.stiffness, "support_friction", prepared.support_friction,
+                 "firmness", prepared.firmness, "rests_first", prepared.ends.first, "rests_last", prepared.ends.last, "report",
                  prepared.report, "warnings", prepared.warnings);
 }
 

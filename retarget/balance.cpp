@@ -25,9 +25,9 @@ struct Centroidal {
   std::vector<Eigen::Matrix3d> inertia;
 };
 
-Centroidal centroidal(const Motion& motion, const physics::Body& body) {
+Centroidal centroidal(const Motion& motion, const physics::Body& body, RestingEnds ends) {
   const Eigen::Index frames = motion.count();
-  const Eigen::MatrixXd acceleration = accelerations(motion);
+  const Eigen::MatrixXd acceleration = accelerations(motion, ends);
   const Eigen::VectorXd& mass = body.mass;
   Centroidal result;
   result.com.resize(3, frames);
@@ -94,14 +94,17 @@ int frames_from_edge(const ContactSchedule& contacts, int point, long f, bool lo
   return 3;
 }
 
-/// The stencil's sum over the path of the COM (3 x F) of a motion around frame f; odd reflection at the ends of what is no loop.
-Eigen::Vector3d jerk_of(const Eigen::MatrixXd& com, const Motion& motion, long f, const std::vector<double>& stencil) {
+bool rests_beyond(long f, RestingEnds ends) { return f < 0 ? ends.first : ends.last; }
+
+/// The stencil's sum over the path of the COM (3 x F) of a motion around frame f; odd reflection at the moving ends of what is no loop.
+Eigen::Vector3d jerk_of(const Eigen::MatrixXd& com, const Motion& motion, RestingEnds ends, long f, const std::vector<double>& stencil) {
   const long frames = motion.count(), reach = static_cast<long>(stencil.size()) / 2;
   const auto place = [&](long g) -> Eigen::Vector3d {
     const long cycle = g < 0 ? -1 : (g >= frames ? 1 : 0);
     if (motion.loop) return after_cycles(motion, cycle) * Eigen::Vector3d(com.col(g - cycle * frames));
     const long inside = std::clamp(g, 0L, frames - 1);
-    return inside == g ? Eigen::Vector3d(com.col(g)) : Eigen::Vector3d(2 * com.col(inside) - com.col(std::clamp(2 * inside - g, 0L, frames - 1)));
+    if (inside == g || rests_beyond(g, ends)) return com.col(inside);
+    return 2 * com.col(inside) - com.col(std::clamp(2 * inside - g, 0L, frames - 1));
   };
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (long k = 0; k < static_cast<long>(stencil.size()); ++k) sum += stencil[static_cast<std::size_t>(k)] * place(f + k - reach);
@@ -140,7 +143,7 @@ std::vector<FrameBalance> frame_balances(const Motion& target, const Centroidal&
 /// The rows of the problem for shift, turn and forces, as they are put together.
 class Rows {
  public:
-  Rows(const Motion& target, BoundedLeastSquares& problem) : target_(target), problem_(problem) {}
+  Rows(const Motion& target, RestingEnds ends, BoundedLeastSquares& problem) : target_(target), ends_(ends), problem_(problem) {}
 
   long next() const { return row_; }
   void add(long row, long column, double value) { entries_.emplace_back(row, column, value); }
@@ -167,13 +170,13 @@ class Rows {
       const double share = stencil[static_cast<std::size_t>(k)];
       const long g = f + k - reach;
       if (share == 0) continue;
-      if (!target_.loop && (g < 0 || g >= frames)) {
+      if (!target_.loop && (g < 0 || g >= frames) && !rests_beyond(g, ends_)) {
         // odd reflection: d(-k) = 2 d(0) - d(k)
         const long end = g < 0 ? 0 : frames - 1;
         add_block(row, end, unknown, 2 * share * block);
         add_block(row, std::clamp(2 * end - g, 0L, frames - 1), unknown, -share * block);
       } else {
-        add_block(row, g, unknown, share * block);
+        add_block(row, target_.loop ? g : std::clamp(g, 0L, frames - 1), unknown, share * block);
       }
     }
   }
@@ -193,6 +196,7 @@ class Rows {
 
  private:
   const Motion& target_;
+  const RestingEnds ends_;
   BoundedLeastSquares& problem_;
   std::vector<Eigen::Triplet<double>> entries_;
   std::vector<double> targets_;
@@ -202,7 +206,7 @@ class Rows {
 /// Unknowns: 6 per frame (move, turn), then the forces in weights, frame after frame, not negative.
 BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts,
                                   const Centroidal& now, const std::vector<FrameBalance>& balances, double length,
-                                  const ShiftCosts& costs, const Shift& so_far) {
+                                  const ShiftCosts& costs, const Shift& so_far, RestingEnds ends) {
   const long frames = target.count();
   const double rate_squared = target.rate_hz * target.rate_hz, g = scene.gravity.norm(), w = kBalanceWeight;
   const double weight = scene.body.mass.sum() * g, place = costs.shift * kShiftWeight, bend = kBendWeight * std::pow(target.rate_hz / 60, 3);
@@ -210,7 +214,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
   BoundedLeastSquares problem;
   for (long c = 0; c <= 6 * frames; c += 3) problem.column_blocks.push_back(static_cast<int>(c));
-  Rows rows(target, problem);
+  Rows rows(target, ends, problem);
   std::vector<long> shift_rows;  // the first of each frame's twelve that cost shift and turn
   long column = 6 * frames;
   for (long f = 0; f < frames; ++f) {
@@ -238,7 +242,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     rows.add_stencil(still + 9, f, 3, costs.shift * bend * identity, third);
     if (costs.jerk > 0) rows.add_stencil(still + 12, f, 0, costs.jerk * bend / length * identity, third);
     Eigen::VectorXd wanted = Eigen::VectorXd::Zero(costs.jerk > 0 ? 15 : 12);
-    if (costs.jerk > 0) wanted.tail<3>() = -costs.jerk * bend / length * jerk_of(now.com, target, f, third);
+    if (costs.jerk > 0) wanted.tail<3>() = -costs.jerk * bend / length * jerk_of(now.com, target, ends, f, third);
     rows.end_block(wanted);
   }
   rows.finish(column);
@@ -283,10 +287,10 @@ std::vector<ContactGenerator> contact_generators(const ContactSchedule& contacts
 }
 
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots, const ShiftCosts& costs, const Shift& so_far) {
-  const Centroidal now = centroidal(target, scene.body);
+                 double support_friction, int max_pivots, const ShiftCosts& costs, const Shift& so_far, RestingEnds ends) {
+  const Centroidal now = centroidal(target, scene.body, ends);
   const std::vector<FrameBalance> balances = frame_balances(target, now, scene, contacts, length, support_friction);
-  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, costs, so_far);
+  const BoundedLeastSquares problem = shift_problem(target, scene, contacts, now, balances, length, costs, so_far, ends);
   const long frames = target.count(), forces = problem.lower.size() - 6 * frames;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(problem.lower.size());
   start.tail(forces).setConstant(1e-3);
@@ -333,9 +337,9 @@ Motion shifted(const Motion& motion, const Shift& shift, const physics::Body& bo
 }
 
 Eigen::MatrixXd missing_wrench(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                               double support_friction) {
+                               double support_friction, RestingEnds ends) {
   const std::vector<FrameBalance> balances =
-      frame_balances(target, centroidal(target, scene.body), scene, contacts, length, support_friction);
+      frame_balances(target, centroidal(target, scene.body, ends), scene, contacts, length, support_friction);
   Eigen::MatrixXd missing(6, target.count());
   for (long f = 0; f < target.count(); ++f) {
     const FrameBalance& frame = balances[static_cast<std::size_t>(f)];

@@ -34,10 +34,11 @@ struct ShiftCosts {
 
 /// The least shift of the COM and turn of the trunk with which gravity, contact forces inside the friction pyramid and momentum, linear
 /// and angular, balance in every frame. length [m] is L. What `so_far` has moved and turned before is counted with it: the sum of both is
-/// to be least; by default there is none. Source: Kajita's and Wensing's centroidal balance in the form of the design, section 5; weights
+/// to be least; by default there is none. A one-shot starts from rest and comes to rest at the `ends` that are told to; at others it has
+/// the speed that it has, and no acceleration. Source: Kajita's and Wensing's centroidal balance in the form of the design, section 5; weights
 /// measured on our clips.
 Shift find_shift(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                 double support_friction, int max_pivots = 60, const ShiftCosts& costs = {}, const Shift& so_far = {});
+                 double support_friction, int max_pivots = 60, const ShiftCosts& costs = {}, const Shift& so_far = {}, RestingEnds ends = {});
 
 /// Adds a shift to what has been moved and turned before (turns are small).
 void add(const Shift& shift, Shift& so_far);
@@ -47,7 +48,7 @@ Motion shifted(const Motion& motion, const Shift& shift, const physics::Body& bo
 
 /// What the best contact forces leave of each frame's balance: force / (m g), moment about the COM / (m g L); 6 x F.
 Eigen::MatrixXd missing_wrench(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
-                               double support_friction);
+                               double support_friction, RestingEnds ends = {});
 
 /// Moves every frame of a flight as a whole so that the COM falls freely between the last and the first frame in contact.
 /// A rigid move leaves volume and shape as they are, and in flight no foot holds it back.

@@ -208,7 +208,8 @@ void project(const Creature& level, double size, PreparedTarget& prepared) {
   prepared.target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
   mark(kTouching);
   for (int round = 0; round < options.rounds && !scene.gravity.isZero(0); ++round) {
-    const Shift shift = find_shift(prepared.target, scene, prepared.contacts, level.length, prepared.support_friction);
+    const Shift shift =
+        find_shift(prepared.target, scene, prepared.contacts, level.length, prepared.support_friction, 60, {}, {}, prepared.ends);
     wanted = shifted(wanted, shift, scene.body);
     prepared.target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
     fall_freely(prepared.contacts, scene, prepared.target);

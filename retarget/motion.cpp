@@ -55,9 +55,11 @@ Eigen::MatrixXd velocities(const Motion& motion) {
   return (padded.rightCols(count) - padded.leftCols(count)) * (0.5 * motion.rate_hz);
 }
 
-Eigen::MatrixXd accelerations(const Motion& motion) {
-  const Eigen::MatrixXd padded = padded_frames(motion, 1);
+Eigen::MatrixXd accelerations(const Motion& motion, RestingEnds ends) {
+  Eigen::MatrixXd padded = padded_frames(motion, 1);
   const Eigen::Index count = motion.count();
+  if (!motion.loop && ends.first) padded.col(0) = motion.frames.col(0);
+  if (!motion.loop && ends.last) padded.col(count + 1) = motion.frames.col(count - 1);
   return (padded.rightCols(count) - 2 * padded.middleCols(1, count) + padded.leftCols(count)) *
          (motion.rate_hz * motion.rate_hz);
 }

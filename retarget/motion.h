@@ -34,9 +34,14 @@ Eigen::Isometry3d after_cycles(const Motion& motion, long cycles);
 /// ends (positions and velocities go on, acceleration is zero there). Returns 3N x (F + 2 pad).
 Eigen::MatrixXd padded_frames(const Motion& motion, int pad);
 
-/// Central differences over the padded frames, 3N x F: [m/s] and [m/s2].
+/// Which ends of a one-shot are at rest: it stands in its first frame before that, in its last behind it.
+struct RestingEnds {
+  bool first = false, last = false;
+};
+
+/// Central differences over the padded frames, 3N x F: [m/s] and [m/s2]. At a resting end the frame itself stands for those beyond it.
 Eigen::MatrixXd velocities(const Motion& motion);
-Eigen::MatrixXd accelerations(const Motion& motion);
+Eigen::MatrixXd accelerations(const Motion& motion, RestingEnds ends = {});
 
 /// A motion at any time: loops go on for ever, one-shots hold their ends. Cubic Hermite between the frames with central
 /// slopes, so positions are C1.

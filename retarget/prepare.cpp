@@ -28,6 +28,7 @@ constexpr double kLeapFriction = 1.05;  // times the usual share of friction: it
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends
 constexpr double kReachInFlight = 0.065;  // strain that its shape is held back less where nothing bears,
 constexpr double kClearOfGround[] = {1.0 / 60, 0.1};  // [s] from the last contact on and until so long before the next
+constexpr double kRest = 0.04;        // by which badness may grow where a one-shot starts from rest and comes to rest
 constexpr double kSpreadShift = 0.15;   // share of the usual cost of the shift where load is spread
 constexpr int kSpreadRounds = 8;        // after which some 1e-4 m g are missing where contact can give all at all
 constexpr double kWorseBalance = 1.5;  // times the least badness: fewer contacts are preferred up to here
@@ -60,6 +61,20 @@ ContactSchedule choose_contacts(const Motion& grounded, const Motion& points, co
   std::size_t chosen = 0;
   while (badness[chosen] > std::max(kGoodBalance, kWorseBalance * least)) ++chosen;
   return schedules[chosen];
+}
+
+/// At which ends of a one-shot the body can be at rest, as it is in a replay. What is cut from a walk eases in and out; what starts in the air cannot.
+RestingEnds resting_ends(const Motion& target, const physics::Scene& scene, const ContactSchedule& contacts, double length,
+                         double support_friction) {
+  if (target.loop) return {};
+  const auto badness = [&](RestingEnds ends) {
+    return find_shift(target, scene, contacts, length, support_friction, 12, {}, {}, ends).badness;
+  };
+  const double most = badness({}) + kRest;
+  for (const RestingEnds ends : {RestingEnds{true, true}, RestingEnds{false, true}, RestingEnds{true, false}}) {
+    if (badness(ends) < most) return ends;
+  }
+  return {};
 }
 
 /// Whether a clip leaps and loads that come and go gently would move it too far.
@@ -210,6 +225,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
     set_feet();
     mark();
   }
+  if (options.momentum) result.ends = resting_ends(target, scene, contacts, length, result.support_friction);
   report.foot_shift_rms_length = rms_difference(locked, grounded, body.mass) / length;
   report.volume_shift_rms_length = rms_difference(target, locked, body.mass) / length;
   const Motion before_momentum = target;
@@ -219,7 +235,8 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   Shift so_far;
   for (int round = 0; options.momentum && round < (options.spread_load ? kSpreadRounds : options.rounds); ++round) {
     // Few rounds that each forget the last keep some margin, too, for they lean on; where the load is spread they end in balance.
-    const Shift shift = find_shift(target, scene, contacts, length, result.support_friction, 60, costs, options.spread_load ? so_far : Shift());
+    const Shift counted = options.spread_load ? so_far : Shift();
+    const Shift shift = find_shift(target, scene, contacts, length, result.support_friction, 60, costs, counted, result.ends);
     add(shift, so_far);
     wanted = shifted(wanted, shift, body);
     target = project_frames(wanted, holds, floor, reach, projector, options.smooth_hz);
@@ -228,7 +245,7 @@ PreparedTarget prepare(const Motion& coupled, const physics::Scene& scene, const
   }
   report.momentum_shift_rms_length = rms_difference(target, before_momentum, body.mass) / length;
   report.total_shift_rms_length = rms_difference(target, grounded, body.mass) / length;
-  result.missing_wrench = missing_wrench(target, scene, contacts, length, result.support_friction);
+  result.missing_wrench = missing_wrench(target, scene, contacts, length, result.support_friction, result.ends);
   measure(result, body, report);
   return result;
 }

@@ -29,6 +29,7 @@ struct PreparedTarget {
   Eigen::VectorXd mass_shares;     // N, in (0, 1]: what of their mass the nodes keep so that the body stands; none: all
   PreparationReport report;
   std::vector<std::string> warnings;
+  RestingEnds ends = {};           // of a one-shot: where it is balanced as standing still
   double support_friction = 0.7;   // of the ground's friction that it uses
   double firmness = 1;             // by which it was prepared, in times the usual
   double stiffness = 1;            // of the body that carries its weight, in times the usual

@@ -29,7 +29,7 @@ struct Gate {
 constexpr Gate kGates[] = {
     {"worm_crawl.glb", "loop", true, 4.99, 0.005, 0.04, 0.92, 1.08, 0.003, 0, false, false},
     {"boxdog_trot.fbx", "loop", true, 14.99, 0.01, 0.04, 0.92, 1.08, 0.003, 0, true, true},
-    {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.25, true, false},
+    {"boxdog_jump.glb", "one_shot", true, 1, 0.03, 0.04, 0.92, 1.08, 0.03, 0.12, true, false},
 };
 constexpr double kHeading = 0.3;  // [deg] a cycle
 // Of the inverse dynamics, on every sample.

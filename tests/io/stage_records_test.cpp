@@ -67,6 +67,7 @@ TEST(TargetFile, ComesBackWholeOrNotAtAll) {
   target.performer = retarget::make_box_performer();
   target.performer.prepared.support_friction = 0.6;
   target.performer.prepared.firmness = 7;
+  target.performer.prepared.ends.last = true;
   target.report.source.clip = "Walk";
   target.report.warnings = {"told"};
   const std::string bytes = target_bytes(target);
@@ -74,6 +75,8 @@ TEST(TargetFile, ComesBackWholeOrNotAtAll) {
   EXPECT_EQ(read.performer.prepared.target.frames, target.performer.prepared.target.frames);
   EXPECT_EQ(read.performer.prepared.support_friction, 0.6);
   EXPECT_EQ(read.performer.prepared.firmness, 7);
+  EXPECT_FALSE(read.performer.prepared.ends.first);
+  EXPECT_TRUE(read.performer.prepared.ends.last);
   EXPECT_EQ(read.performer.prepared.contacts.state, target.performer.prepared.contacts.state);
   EXPECT_EQ(read.performer.muscles.fields, target.performer.muscles.fields);
   EXPECT_EQ(read.report.source.clip, "Walk");

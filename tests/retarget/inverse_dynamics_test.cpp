@@ -8,6 +8,8 @@
 #include <ctime>
 #include <string>
 
+#include "physics/elastic_forces.h"
+#include "physics/internal_forces.h"
 #include "tests/retarget/box_creature.h"
 #include "tests/sanitizers.h"
 
@@ -81,6 +83,72 @@ TEST(InverseDynamics, PushTheGroundHarderToRiseFaster) {
     const InverseDynamics inverse = solve_standing(creature, motion);
     const double wanted = creature.mass() * (9.81 + rise);
     EXPECT_NEAR(ground_force(inverse, 3).y(), wanted, 0.01 * wanted);
+  }
+}
+
+TEST(InverseDynamics, AtRestingEndsTheGroundGivesTheSpeedAndTakesIt) {
+  const BoxCreature creature = make_box_creature();
+  const double weight = creature.mass() * 9.81, speed = 0.05, push = creature.mass() * speed * 60;  // within a frame
+  const Motion rising = played(creature, 7, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
+    return Eigen::Vector3d(x + Eigen::Vector3d(0, speed * static_cast<double>(f) / 60, 0));
+  });
+  for (const RestingEnds ends : {RestingEnds{}, RestingEnds{true, false}, RestingEnds{false, true}, RestingEnds{true, true}}) {
+    SCOPED_TRACE(std::string(ends.first ? "from rest, " : "") + (ends.last ? "to rest" : ""));
+    PreparedTarget plan = as_prepared(rising, always_standing(creature, rising.count()));
+    plan.ends = ends;
+    const InverseDynamics inverse = solve_inverse_dynamics(plan, creature.scene, kLength, {});
+    EXPECT_NEAR(ground_force(inverse, 0).y(), weight + (ends.first ? push : 0), 0.02 * weight);
+    EXPECT_NEAR(ground_force(inverse, 3).y(), weight, 0.02 * weight);
+    EXPECT_NEAR(ground_force(inverse, 6).y(), weight - (ends.last ? push : 0), 0.02 * weight);
+  }
+}
+
+/// A box that stretches on its soles and takes off in frame `last`, with `speed` [m/s] from there on.
+PreparedTarget taking_off(const BoxCreature& creature, Eigen::Index last, double speed) {
+  constexpr Eigen::Index kFlight = 8;
+  const double height = creature.height(), stretch = speed / height * static_cast<double>(last) / 60 / 2;
+  const Motion motion = played(creature, last + kFlight, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
+    const double done = static_cast<double>(std::min(f, last)) / static_cast<double>(last);
+    const double fly_s = static_cast<double>(std::max<Eigen::Index>(0, f - last)) / 60;
+    return Eigen::Vector3d(x.x(), x.y() * (1 + stretch * (done * done - 1)) + speed * fly_s, x.z());
+  });
+  ContactSchedule contacts = always_standing(creature, motion.count());
+  for (Eigen::Index f = last + 1; f < motion.count(); ++f) {
+    contacts.touching.col(f).setConstant(false);
+    for (std::vector<ContactState>& states : contacts.state) states[static_cast<std::size_t>(f)] = ContactState::kOff;
+  }
+  return as_prepared(motion, contacts);
+}
+
+TEST(InverseDynamics, PressFeetThatTakeOffUntilTheyDo) {
+  const BoxCreature creature = make_box_creature();
+  const physics::Body& body = creature.scene.body;
+  const double weight = creature.mass() * 9.81;
+  constexpr Eigen::Index kLast = 6;
+  for (const double speed : {0.5, 1.0, 1.5}) {
+    SCOPED_TRACE("speed " + std::to_string(speed));
+    const PreparedTarget plan = taking_off(creature, kLast, speed);
+    const InverseDynamics inverse = solve_inverse_dynamics(plan, creature.scene, kLength, {});
+    physics::InternalForces<3> internal(body);
+    internal.set_activation(inverse.activation.col(kLast));
+    // How hard the body presses its soles down, beyond what the ground is to give, if these move so.
+    const auto pressed = [&](bool stand) {
+      const Eigen::Matrix3Xd x = plan.target.at(kLast);
+      Eigen::Matrix3Xd v = velocities(plan.target).col(kLast).reshaped(3, x.cols()), force = Eigen::Matrix3Xd::Zero(3, x.cols());
+      double down = -ground_force(inverse, kLast).y();
+      for (int i = 0; stand && i < body.node_count(); ++i) {
+        if (body.rest(1, i) < 0.05) v.col(i).setZero();
+      }
+      internal.add_elastic_forces(x, force);
+      physics::add_damping_forces(body, x, v, force);
+      for (int i = 0; i < body.node_count(); ++i) {
+        if (body.rest(1, i) < 0.05) down -= force(1, i) - body.mass[i] * (9.81 + accelerations(plan.target).col(kLast)[3 * i + 1]);
+      }
+      return down / weight;
+    };
+    const double lifted = pressed(false);
+    EXPECT_GT(lifted, 1);
+    EXPECT_LT(std::abs(pressed(true)), 0.03 * lifted);
   }
 }
 

@@ -103,6 +103,24 @@ TEST(PaddedFrames, OfAOneShotMirrorItsEnds) {
   EXPECT_LT(accelerations(motion).col(last).norm(), 1e-9);
 }
 
+TEST(Accelerations, GiveAMotionItsSpeedFromRestAndTakeItBack) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Motion motion = random_motion(seed, false);
+    const Eigen::Index last = motion.count() - 1;
+    const Eigen::VectorXd first_step = motion.frames.col(1) - motion.frames.col(0), last_step = motion.frames.col(last) - motion.frames.col(last - 1);
+    const auto steps = [&](RestingEnds ends) -> Eigen::VectorXd {  // what all accelerations together change of a frame's step
+      return accelerations(motion, ends).rowwise().sum() / (motion.rate_hz * motion.rate_hz);
+    };
+    EXPECT_LT(steps({true, true}).norm(), 1e-12);
+    EXPECT_LT((steps({true, false}) - last_step).norm(), 1e-12);
+    EXPECT_LT((steps({false, true}) + first_step).norm(), 1e-12);
+    EXPECT_LT((steps({}) - last_step + first_step).norm(), 1e-12);
+  }
+  const Motion loop = random_motion(1, true);
+  EXPECT_EQ(accelerations(loop, {true, true}), accelerations(loop));
+}
+
 TEST(Differences, OfAParabolaAreExact) {
   Motion motion;
   motion.rate_hz = 50;

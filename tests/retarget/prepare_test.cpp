@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -283,6 +284,50 @@ TEST(Prepare, ASpreadLoadIsBalancedFurtherInside) {
     EXPECT_LT(wide.report.missing_wrench_max_mg, 2e-3);
     EXPECT_LT(overhang(creature, wide), 0.98 * overhang(creature, usual));
     EXPECT_GT(wide.report.total_shift_rms_length, usual.report.total_shift_rms_length);  // what it costs
+  }
+}
+
+/// [m/s] of the centre of mass from the first frame to the second and from the last but one to the last.
+std::array<double, 2> end_speeds(const physics::Body& body, const Motion& motion) {
+  const auto speed = [&](Eigen::Index f) {
+    return motion.rate_hz * (physics::centre_of_mass(body, motion.at(f + 1)) - physics::centre_of_mass(body, motion.at(f))).norm();
+  };
+  return {speed(0), speed(motion.count() - 2)};
+}
+
+TEST(Prepare, AOneShotStartsFromRestAndComesToRest) {
+  // Cut from where a box that squats on its soles comes up and goes down.
+  const BoxCreature creature = make_box_creature();
+  const physics::Body& body = creature.scene.body;
+  for (const double depth : {0.03, 0.05}) {
+    for (const double phase : {0.0, 0.8, 2.5, 4.0}) {
+      SCOPED_TRACE("depth " + std::to_string(depth) + ", phase " + std::to_string(phase));
+      const Motion motion = played(creature, 40, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
+        const double squat = depth * std::sin(phase + 2 * M_PI * static_cast<double>(f) / 30);
+        return Eigen::Vector3d(x.x(), x.y() * (1 - squat), x.z());
+      });
+      const PreparedTarget target = prepared(creature, motion);
+      EXPECT_TRUE(target.ends.first);
+      EXPECT_TRUE(target.ends.last);
+      EXPECT_LT(target.report.missing_wrench_max_mg, 1e-3);
+      const double fastest = depth * 0.2 * 2 * M_PI * 2;  // [m/s] of the squat
+      for (const double speed : end_speeds(body, target.target)) EXPECT_LT(speed, 0.35 * fastest);  // what a push within a frame gives
+    }
+  }
+}
+
+TEST(Prepare, WhatRisesInTheAirStartsWithItsSpeed) {
+  const BoxCreature creature = make_box_creature();
+  for (const double speed : {1.5, 2.0}) {
+    SCOPED_TRACE("speed " + std::to_string(speed));
+    const Motion motion = played(creature, 50, false, [&](const Eigen::Vector3d& x, Eigen::Index f) {
+      const double time = static_cast<double>(f) / 60;
+      return Eigen::Vector3d(x + Eigen::Vector3d(0, std::max(0.0, 0.05 + speed * time - 0.5 * 9.81 * time * time), 0));
+    });
+    const PreparedTarget target = prepared(creature, motion);
+    EXPECT_FALSE(target.ends.first);
+    EXPECT_TRUE(target.ends.last);
+    EXPECT_GT(end_speeds(creature.scene.body, target.target)[0], 0.8 * speed);
   }
 }
 

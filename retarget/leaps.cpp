@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kLeap = 0.05;     // [s] in the air: less is a flicker of contacts
 constexpr double kFeetOfLeaps = 1.0 / 8, kMomentumOfHops = 0.5;  // of the rows' usual weights
-constexpr double kEffortOfHops = 3.2, kNodesOfHops = 3, kHorizonOfHops = 1.5;  // times the usual
+constexpr double kHorizonOfLeaps = 1.5, kEffortOfHops = 3.2, kNodesOfHops = 3, kSettleOnce = 0.4;  // times the usual
 
 /// Frame f of a loop may lie a period on or before.
 std::size_t wrapped(long f, long frames) { return static_cast<std::size_t>(((f % frames) + frames) % frames); }
@@ -111,11 +111,14 @@ CorrectorOptions gain_of_leaps(const PreparedTarget& plan, const CorrectorOption
   CorrectorOptions result = options;
   if (!has_flight(plan)) return result;
   result.foot_weight *= kFeetOfLeaps;
-  if (!plan.target.loop) return result;
+  result.horizon_s *= kHorizonOfLeaps;
+  if (!plan.target.loop) {
+    result.settle_s *= kSettleOnce;
+    return result;
+  }
   result.root_weight *= kMomentumOfHops;
   result.effort *= kEffortOfHops;
   result.node_weight *= kNodesOfHops;
-  result.horizon_s *= kHorizonOfHops;
   result.long_step = std::numeric_limits<double>::infinity();
   return result;
 }

@@ -181,7 +181,7 @@ Run::Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr
       corrector_(input.model, input.muscles, input.length, input.limit, gain_),
       observer_(options.observation, control_s_),
       estimate_(options.observation, control_s_, input.scene.gravity.norm()),
-      glide_(glide_for(input.prepared, options.corrector.settle_s, input.length)),
+      glide_(glide_for(input.prepared, gain_.settle_s, input.length)),
       planned_(input.prepared),
       stride_(input.prepared, input.length, input.scene.body.edges, input.feed_forward),
       return_map_(input.prepared, input.length, input.scene.body),

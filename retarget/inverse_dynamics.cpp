@@ -64,7 +64,7 @@ std::vector<bool> bearing_nodes(const physics::Scene& scene, const ContactSchedu
   return bear;
 }
 
-/// Central differences, but for what takes off: it stands until its last frame on the ground ends, whatever it does then. With the mean of
+/// [m/s], 3N x F: central differences, but for what takes off: it stands until its last frame on the ground ends, whatever it does then. With the mean of
 /// both speeds the dashpots above it pull less than they are going to, and the feet come off before the push is over. Of a loop,
 /// whose next hop makes up for this one, central differences are the better ones (measured, a frog's: it rises too high as it is).
 Eigen::MatrixXd velocities_on_ground(const PreparedTarget& prepared, const physics::Scene& scene) {

@@ -50,6 +50,7 @@ void Corrector::reset() {
   responses_.forget();
 }
 
+/// What comes without any muscle.
 void Corrector::find_free_deviation(const physics::State& state, const physics::State& reference) {
   const physics::Body& body = scene_.body;
   force_.setZero(3, body.node_count());
@@ -57,6 +58,19 @@ void Corrector::find_free_deviation(const physics::State& state, const physics::
   forces_.add_elastic_forces(state.x, force_);
   forces_.add_elastic_forces(reference.x, reference_force_);
   deviation_ = ((state.v - reference.v) * body.mass.asDiagonal() + options_.horizon_s * (force_ - reference_force_)).reshaped();
+  responses_.solve_in_place(deviation_);
+}
+
+/// The same by all forces halfway through the step, where those of the `settled` reference balance; dashpots count as they turn with
+/// the body.
+void Corrector::find_free_deviation_of_settled(const physics::State& state, const physics::State& settled) {
+  const physics::Body& body = scene_.body;
+  force_.setZero(3, body.node_count());
+  reference_force_.setZero(3, body.node_count());
+  const Eigen::Matrix3Xd ahead = 0.5 * options_.horizon_s * settled.v;
+  forces_.add_forces({state.x + ahead, settled.v}, force_);
+  forces_.add_forces({settled.x + ahead, settled.v}, reference_force_);
+  deviation_ = ((state.v - settled.v) * body.mass.asDiagonal() + options_.horizon_s * (force_ - reference_force_)).reshaped();
   responses_.solve_in_place(deviation_);
 }
 
@@ -143,15 +157,13 @@ double Corrector::least_margin() const {
   return (cones_.leftCols(previous_.size()) * previous_ + cones_.col(previous_.size())).minCoeff();
 }
 
-/// Finds what comes without any muscle; false: nothing is to be added.
-bool Corrector::begin(const physics::State& state, const physics::State& reference, const ContactNow& contact, const Eigen::VectorXd& activation,
-                      int response_every) {
+/// Finds the muscles' response; false: nothing is to be added.
+bool Corrector::begin(const physics::State& state, const ContactNow& contact, const Eigen::VectorXd& activation, int response_every) {
   forces_.set_activation(activation);
   if (!responses_.update(state, forces_, contact.touching, response_every)) {
     previous_.setZero();
     return false;
   }
-  find_free_deviation(state, reference);
   return true;
 }
 
@@ -173,7 +185,8 @@ double Corrector::correct(const physics::State& state, const physics::State& ref
                           Eigen::VectorXd& activation) {
   const Eigen::Index muscles = muscles_.fields.cols();
   const bool is_calm = momentum_error_ < options_.calm_error;  // a creature that fights a push needs its response fresh
-  if (!begin(state, reference, contact, activation, is_calm ? options_.response_every : 1)) return 0;
+  if (!begin(state, contact, activation, is_calm ? options_.response_every : 1)) return 0;
+  find_free_deviation(state, reference);
 
   // Rows as speeds per sqrt(g L). Feet come before the error of place is spread over all nodes, for they have their own.
   weighted_.resize(6 + 3 * static_cast<Eigen::Index>(contact.in_air.size()), muscles + 1);
@@ -205,7 +218,8 @@ double Corrector::regulate(const CostToGo& cost, double time_s, const Eigen::Mat
                            const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation) {
   learn_disturbance(deviation_along(cost.modes(), heading, state, reference, length_, speed_unit_));
   predicted_.resize(0);
-  if (!begin(state, reference, contact, activation, 1)) return 0;
+  if (!begin(state, contact, activation, 1)) return 0;
+  find_free_deviation_of_settled(state, cost.settled(time_s, heading, reference));
   find_cones(contact);
   const Eigen::Index modes = cost.modes().count();
   const double step = options_.horizon_s * speed_unit_ / length_, next_s = time_s + options_.horizon_s;
@@ -218,7 +232,8 @@ double Corrector::regulate(const CostToGo& cost, double time_s, const Eigen::Mat
 
   const auto [of_speeds, with_step] = by_step(cost.at(next_s).cast<double>(), step);
   const Eigen::VectorXd lasting = options_.regulator.last * (cost.at_disturbed(next_s).cast<double>() * disturbance_);
-  const Eigen::VectorXd pull = with_step.transpose() * free + step * lasting.head(modes) + lasting.tail(modes);
+  const Eigen::VectorXd ahead = cost.pull(next_s).cast<double>() + lasting;
+  const Eigen::VectorXd pull = with_step.transpose() * free + step * ahead.head(modes) + ahead.tail(modes);
   Eigen::MatrixXd left = product_of_transposed(speeds, product(of_speeds, speeds));
   left.diagonal().array() += options_.regulator.effort;
   const double rms = act(left, -speeds.transpose() * pull, activation);

@@ -56,6 +56,8 @@ struct ContactNow {
 ///
 /// Where a cost to go is known, regulate() takes the place of that target: min_w z' S z + effort |w|^2 + the excess over cones, of
 /// the deviation z after one control step (horizon_s), by the same response, so that what touches counts as it is and not as planned.
+/// Here dv_free has the dashpots' forces too, and the reference is to be CostToGo::settled: internal forces that do not balance there, or some
+/// of them alone, would turn with the body and be taken for a moment on it.
 /// What such steps turn out to miss is taken for a disturbance that lasts a while: of another body, of what the plan left out. It fades
 /// (RegulatorOptions::keep), so that it lessens what a body is off for good and does not end it. Source: Muske, Badgwell, "Disturbance
 /// modeling for offset-free linear model predictive control", Journal of Process Control 12, 2002.
@@ -69,7 +71,7 @@ class Corrector {
   /// muscles' correction.
   double correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
                  Eigen::VectorXd& activation);
-  /// The same by what deviations cost from the time [s] on; `heading` turns the motion's first period into this one.
+  /// The same by what deviations from a settled reference cost from the time [s] on; `heading` turns the motion's first period into this one.
   double regulate(const CostToGo& cost, double time_s, const Eigen::Matrix3d& heading, const physics::State& state,
                   const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation);
   void reset();
@@ -82,12 +84,12 @@ class Corrector {
 
  private:
   void find_free_deviation(const physics::State& state, const physics::State& reference);
+  void find_free_deviation_of_settled(const physics::State& state, const physics::State& settled);
   double weigh_momentum(const physics::State& state, const ContactNow& contact);
   void find_step(const physics::State& state, const physics::State& reference);
   void weigh_feet(const physics::State& state, const physics::State& reference, const ContactNow& contact);
   std::vector<bool> held_to_cones(const ContactNow& contact) const;
-  bool begin(const physics::State& state, const physics::State& reference, const ContactNow& contact, const Eigen::VectorXd& activation,
-             int response_every);
+  bool begin(const physics::State& state, const ContactNow& contact, const Eigen::VectorXd& activation, int response_every);
   void learn_disturbance(const Eigen::VectorXd& deviation);
   void find_cones(const ContactNow& contact);
   double act(const Eigen::MatrixXd& left, const Eigen::VectorXd& right, Eigen::VectorXd& activation);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "retarget/dense_product.h"
+#include "retarget/equilibrium.h"
 #include "retarget/linear_step.h"
 
 namespace hydrostat::retarget {
@@ -16,7 +17,7 @@ constexpr long kSamples = 12;         // moments that modes are found in
 constexpr long kMostMatrices = 400;   // that are kept
 constexpr double kEndWeight = 10;     // of a deviation at the end, over that of a step
 
-/// The planned motion in control steps.
+/// The planned motion halfway through its control steps, where its forces balance.
 class Moments {
  public:
   Moments(const RegulatedMotion& motion, double control_s)
@@ -24,19 +25,20 @@ class Moments {
         target_(motion.prepared.target),
         curve_(target_),
         path_(motion.path),
+        equilibrium_(motion.scene, motion.length),
         steps_(std::max(1L, std::lround(target_.duration_s() / control_s))),
         step_s_(target_.duration_s() > 0 ? target_.duration_s() / static_cast<double>(steps_) : control_s) {}
 
   long steps() const { return steps_; }
   double step_s() const { return step_s_; }
 
-  PlannedMoment at(long step) {
-    const double time_s = static_cast<double>(step) * step_s_;
+  /// `settling`: by how much it has moved from the plan [m], 3 x N.
+  PlannedMoment at(long step, Eigen::Matrix3Xd& settling) {
+    const double time_s = (static_cast<double>(step) + 0.5) * step_s_;
     PlannedMoment moment;
-    curve_.at(time_s, moment.state.x, moment.state.v);
-    path_.apply(time_s, moment.state);
+    moment.state = planned(time_s);
     moment.activation.resize(motion_.scene.body.edge_count());
-    motion_.feed_forward(time_s + 0.5 * step_s_, moment.activation);
+    motion_.feed_forward(time_s, moment.activation);
     const ContactSchedule& contacts = motion_.prepared.contacts;
     const auto points = static_cast<std::size_t>(motion_.scene.contact_points.count());
     moment.touching.assign(points, ContactState::kOff);
@@ -50,31 +52,56 @@ class Moments {
         moment.patch[static_cast<std::size_t>(p)] = static_cast<int>(k);
       }
     }
+    const physics::State planned = moment.state;
+    equilibrium_.settle(acceleration(time_s), moment);
+    settling = moment.state.x - planned.x;
     return moment;
   }
   std::vector<PlannedMoment> some() {
     std::vector<PlannedMoment> moments;
     const long count = std::min(kSamples, steps_);
-    for (long k = 0; k < count; ++k) moments.push_back(at(k * steps_ / count));
+    Eigen::Matrix3Xd settling;
+    for (long k = 0; k < count; ++k) moments.push_back(at(k * steps_ / count, settling));
     return moments;
   }
 
  private:
+  physics::State planned(double time_s) {
+    physics::State state;
+    curve_.at(time_s, state.x, state.v);
+    path_.apply(time_s, state);
+    return state;
+  }
+  /// The mean over a frame, 3 x N [m/s2].
+  Eigen::Matrix3Xd acceleration(double time_s) {
+    const double half_s = 0.5 / target_.rate_hz;
+    return (planned(time_s + half_s).v - planned(time_s - half_s).v) * target_.rate_hz;
+  }
+
   const RegulatedMotion& motion_;
   const Motion& target_;
   const MotionCurve curve_;
   NominalPathCurve path_;
+  Equilibrium equilibrium_;
   const long steps_;
   const double step_s_;
 };
 
-/// S and T, see find_cost_to_go.
+/// S, T and p, see find_cost_to_go.
 struct Costs {
   Eigen::MatrixXd of_deviation, of_disturbance;
+  Eigen::VectorXd pull;
+};
+
+/// A step of the plan.
+struct PlannedStep {
+  LinearStep linear;      // about where forces balance
+  Eigen::VectorXd drift;  // R: what it makes of the speeds of a body on the plan, where they do not
 };
 
 /// One step earlier.
-void go_back(const LinearStep& step, const Eigen::VectorXd& weights, const RegulatorOptions& options, Costs& costs) {
+void go_back(const PlannedStep& planned, const Eigen::VectorXd& weights, const RegulatorOptions& options, Costs& costs) {
+  const LinearStep& step = planned.linear;
   Eigen::MatrixXd& cost = costs.of_deviation;
   const Eigen::Index modes = step.drive.rows();
   const CostByStep next = by_step(cost, step.advance);
@@ -86,8 +113,13 @@ void go_back(const LinearStep& step, const Eigen::VectorXd& weights, const Regul
 
   const Eigen::MatrixXd ahead = cost + options.last * costs.of_disturbance;
   const Eigen::MatrixXd ahead_by_step = step.advance * ahead.topRows(modes) + ahead.bottomRows(modes);  // R x 2R: P^T ahead
-  costs.of_disturbance = product_of_transposed(step.carry - product(step.drive, gains), ahead_by_step);
+  const Eigen::MatrixXd closed = step.carry - product(step.drive, gains);
+  costs.of_disturbance = product_of_transposed(closed, ahead_by_step);
   costs.of_disturbance.topRows(modes) += ahead.topRows(modes);
+
+  const Eigen::VectorXd pull = costs.pull + next.with_step * planned.drift;
+  costs.pull = closed.transpose() * (step.advance * pull.head(modes) + pull.tail(modes));
+  costs.pull.head(modes) += pull.head(modes);
 
   const Eigen::MatrixXd by_place = product(next.with_step.topRows(modes), step.carry);  // R x 2R
   const Eigen::MatrixXd of_places = cost.topLeftCorner(modes, modes);
@@ -123,6 +155,12 @@ std::size_t CostToGo::step_at(double time_s) const {
   return static_cast<std::size_t>(is_loop_ ? (step % count + count) % count : std::clamp(step, 0L, count - 1));
 }
 
+physics::State CostToGo::settled(double time_s, const Eigen::Matrix3d& heading, const physics::State& planned) const {
+  physics::State state = planned;
+  state.x += heading * settling_[step_at(time_s)];
+  return state;
+}
+
 Eigen::VectorXd deviation_along(const ReducedModes& modes, const Eigen::Matrix3d& heading, const physics::State& state,
                                 const physics::State& reference, double length, double wave_speed) {
   Eigen::VectorXd deviation(2 * modes.count());
@@ -141,6 +179,8 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
   result.spacing_s_ = static_cast<double>(apart) * moments.step_s();
   result.costs_.resize(static_cast<std::size_t>(count));
   result.disturbed_.resize(result.costs_.size());
+  result.pulls_.resize(result.costs_.size());
+  result.settling_.resize(result.costs_.size());
   LinearSteps linear(motion.scene, motion.muscles, result.modes_, motion.length, moments.step_s());
 
   const double mass = motion.scene.body.mass.sum();
@@ -148,7 +188,7 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
   Eigen::VectorXd weights(2 * modes);
   weights.head(modes).setConstant(options.place / mass);
   weights.tail(modes).setConstant(options.speed / mass);
-  Costs costs{(kEndWeight * weights).asDiagonal(), Eigen::MatrixXd::Zero(2 * modes, 2 * modes)};
+  Costs costs{(kEndWeight * weights).asDiagonal(), Eigen::MatrixXd::Zero(2 * modes, 2 * modes), Eigen::VectorXd::Zero(2 * modes)};
   const long ahead = std::lround(kForgotten / moments.step_s());
   const Eigen::MatrixXd turn = into_next_period(result.modes_, target.loop ? target.yaw : 0);
   const auto pass_seam = [&] {
@@ -159,12 +199,20 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
         cost->middleCols(r, modes) = (cost->middleCols(r, modes) * turn).eval();
       }
     }
+    for (const Eigen::Index r : {Eigen::Index{0}, modes}) costs.pull.segment(r, modes) = (turn.transpose() * costs.pull.segment(r, modes)).eval();
   };
-  std::vector<LinearStep> known(static_cast<std::size_t>(target.loop && steps <= ahead ? steps : 0));  // a short loop comes by again and again
+  std::vector<PlannedStep> known(static_cast<std::size_t>(target.loop && steps <= ahead ? steps : 0));  // a short loop comes by again and again
+  const auto find_step = [&](long k) {
+    Eigen::Matrix3Xd settling;
+    PlannedStep step{linear.at(moments.at(k, settling)), {}};
+    step.drift = step.linear.carry.leftCols(modes) * (result.modes_.project * settling.reshaped()) / -motion.length;
+    if (k % apart == 0 && k < steps) result.settling_[static_cast<std::size_t>(k / apart)] = std::move(settling);
+    return step;
+  };
   const auto step_at = [&](long k) {
-    if (known.empty()) return linear.at(moments.at(k));
-    LinearStep& step = known[static_cast<std::size_t>(k)];
-    if (step.carry.size() == 0) step = linear.at(moments.at(k));
+    if (known.empty()) return find_step(k);
+    PlannedStep& step = known[static_cast<std::size_t>(k)];
+    if (step.drift.size() == 0) step = find_step(k);
     return step;
   };
   if (target.loop) {
@@ -173,7 +221,7 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
       if (k % steps == 0) pass_seam();
     }
   } else {
-    const LinearStep standing = linear.at(moments.at(steps));
+    const PlannedStep standing = find_step(steps);
     for (long k = 0; k < ahead; ++k) go_back(standing, weights, options, costs);
   }
   for (long k = steps - 1; k >= 0; --k) {
@@ -181,8 +229,9 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
     if (k % apart != 0) continue;
     result.costs_[static_cast<std::size_t>(k / apart)] = costs.of_deviation.cast<float>();
     result.disturbed_[static_cast<std::size_t>(k / apart)] = costs.of_disturbance.cast<float>();
+    result.pulls_[static_cast<std::size_t>(k / apart)] = costs.pull.cast<float>();
   }
-  result.is_sound_ = costs.of_deviation.allFinite() && costs.of_disturbance.allFinite();
+  result.is_sound_ = costs.of_deviation.allFinite() && costs.of_disturbance.allFinite() && costs.pull.allFinite();
   return result;
 }
 

@@ -50,6 +50,10 @@ class CostToGo {
   /// Of a deviation along the modes at the time [s].
   double of(const Eigen::VectorXd& deviation, double time_s) const { return deviation.dot(at(time_s).cast<double>() * deviation); }
   const ReducedModes& modes() const { return modes_; }
+  /// What the plan itself costs beside a deviation z from it: 2 z' pull.
+  const Eigen::VectorXf& pull(double time_s) const { return pulls_[step_at(time_s)]; }
+  /// The planned state of a time moved to where its forces balance (Equilibrium); `heading` turns the motion's first period into the state's.
+  physics::State settled(double time_s, const Eigen::Matrix3d& heading, const physics::State& planned) const;
   /// False where a matrix was no number: there is no regulator for such a motion.
   bool is_sound() const { return is_sound_; }
 
@@ -62,6 +66,8 @@ class CostToGo {
   bool is_loop_ = false, is_sound_ = true;
   double spacing_s_ = 0;                            // between matrices
   std::vector<Eigen::MatrixXf> costs_, disturbed_;  // of a period or of the run, 2R x 2R
+  std::vector<Eigen::VectorXf> pulls_;              // likewise, 2R
+  std::vector<Eigen::Matrix3Xd> settling_;          // [m] likewise, 3 x N: from the plan to where forces balance
 };
 
 /// What of S, 2R x 2R, counts where only a step's speeds u' are free and its places follow: with P = (a 1, 1), z' = (q, 0) + P u'.
@@ -74,7 +80,8 @@ struct CostByStep {
 CostByStep by_step(const Eigen::MatrixXd& cost, double advance);
 
 /// Riccati's recursion, backwards over the control steps: S = Q + F' S1 F - F' S1 G (W + G' S1 G)^-1 G' S1 F, and T = C' (S1 + r T1) for
-/// a disturbance of each step's end, that is r times as large in the next, with the closed loop C. A loop begins a second
+/// a disturbance of each step's end, that is r times as large in the next, with the closed loop C. Steps are linear about moments that
+/// balance (Equilibrium): about the plan itself they would turn a body by what its signals leave. A loop begins a second
 /// ahead, for what lies further off hardly counts; what is played once stands in the end.
 /// Source: Anderson, Moore, "Optimal Control: Linear Quadratic Methods", Prentice Hall, 1990, section 2.4; Bittanti, Colaneri, De Nicolao,
 /// "The periodic Riccati equation", in The Riccati Equation, Springer, 1991.

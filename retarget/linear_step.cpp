@@ -1,6 +1,7 @@
 #include "retarget/linear_step.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -16,6 +17,14 @@ constexpr double kLevelShare = 0.25; // of a wrong height that the ground takes 
 constexpr double kSoftest = 0.5;     // of a mode's mass that a step has to move at least, however much the mode buckles
 
 Eigen::MatrixXd symmetric(const Eigen::MatrixXd& matrix) { return 0.5 * (matrix + matrix.transpose()); }
+
+/// The matrix with its symmetric part raised to `least` where that is less.
+Eigen::MatrixXd at_least(double least, const Eigen::MatrixXd& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric(matrix));
+  const Eigen::VectorXd raise = (least - solver.eigenvalues().array()).cwiseMax(0);
+  if (raise.isZero(0)) return matrix;
+  return matrix + product(solver.eigenvectors() * raise.asDiagonal(), solver.eigenvectors().transpose());
+}
 
 }  // namespace
 
@@ -55,7 +64,7 @@ LinearSteps::Derivatives LinearSteps::derivatives(const PlannedMoment& moment) {
   dashpots_.set_zero();
   dashpots_.add_damping(scene_.body, moment.state.x, 1);
   const Eigen::MatrixXd by_speed = dashpots_.lower().selfadjointView<Eigen::Lower>() * modes_.fields;
-  return {symmetric(product_of_transposed(modes_.fields, by_place)), symmetric(product_of_transposed(modes_.fields, by_speed))};
+  return {product_of_transposed(modes_.fields, by_place), symmetric(product_of_transposed(modes_.fields, by_speed))};
 }
 
 LinearSteps::Holds LinearSteps::holds(const PlannedMoment& moment) const {
@@ -92,10 +101,9 @@ LinearStep LinearSteps::at(const PlannedMoment& moment) {
   const Eigen::Index modes = modes_.count();
   const double h = step_s_, per_second = speed_unit_ / length_;
   const Holds held = holds(moment);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> system(Eigen::MatrixXd::Identity(modes, modes) + h * damping + h * h * stiffness +
-                                                              contact_mass_ * held.stick);
-  const Eigen::MatrixXd inverse = product(system.eigenvectors() * system.eigenvalues().cwiseMax(kSoftest).cwiseInverse().asDiagonal(),
-                                          system.eigenvectors().transpose());
+  const Eigen::MatrixXd system =
+      Eigen::MatrixXd::Identity(modes, modes) + h * damping + h * h * stiffness + contact_mass_ * held.stick;
+  const Eigen::MatrixXd inverse = at_least(kSoftest, system).partialPivLu().inverse();
   LinearStep step;
   step.advance = h * per_second;
   step.carry.resize(modes, 2 * modes);

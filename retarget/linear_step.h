@@ -26,8 +26,9 @@ struct LinearStep {
 /// where J are the middles of the patches that touch by plan, each as often as it has touching points, and Jn their normals: a patch that has
 /// come down elsewhere stays there, its height is the ground's, and it takes no torque. Each point by itself would be held from above as
 /// well as from below, and a body that relies on soles that pull tips over as soon as they lift. K is the whole derivative: a body
-/// tips over its feet by the part that compression adds, and what the Hessian's positive part alone would tell stands by itself. Modes that
-/// buckle faster than a step can follow count as slower ones.
+/// tips over its feet by the part that compression adds, and what the Hessian's positive part alone would tell stands by itself. Dashpots at
+/// work that turn give it a part without symmetry; made symmetric it would turn the body from inside. Modes that buckle faster than
+/// a step can follow count as slower ones.
 class LinearSteps {
  public:
   /// length [m] is L. Everything must outlive this.
@@ -37,7 +38,7 @@ class LinearSteps {
 
  private:
   struct Derivatives {
-    Eigen::MatrixXd stiffness, damping;  // R x R, symmetric
+    Eigen::MatrixXd stiffness, damping;  // R x R; what dashpots add to the stiffness as they turn has no symmetry
   };
   struct Holds {
     Eigen::MatrixXd stick, level;  // R x R: J^T J, Jn^T Jn

@@ -60,6 +60,23 @@ inline BoxCreature make_box_creature() {
   return creature;
 }
 
+/// The box on its two outermost points that lie across: on a line, over which it tips.
+inline BoxCreature make_tiptoe_box() {
+  BoxCreature creature = make_box_creature();
+  physics::ContactPoints& points = creature.scene.contact_points;
+  std::vector<int> kept, bones;
+  for (int p = 0; p < points.count(); ++p) {
+    const Eigen::Vector3d place = points.of(creature.scene.body.rest, p);
+    const bool is_back_right = place.x() < 0.05 && place.z() < 0.05, is_front_left = place.x() > 0.45 && place.z() > 0.35;
+    if (!is_back_right && !is_front_left) continue;
+    kept.push_back(p);
+    bones.push_back(creature.patch_bone[static_cast<std::size_t>(p)]);
+  }
+  points = {points.nodes(Eigen::all, kept).eval(), points.weights(Eigen::all, kept).eval()};
+  creature.patch_bone = bones;
+  return creature;
+}
+
 /// The box of finite elements in the place of springs: its tets, or the cells that they cut.
 inline BoxCreature make_element_box_creature(bool hexahedra,
                                              physics::ElasticLaw law = physics::ElasticLaw::kStableNeoHookean) {
@@ -115,7 +132,7 @@ inline Motion bobbing(const BoxCreature& creature, Eigen::Index frames, double a
   });
 }
 
-/// All four soles stand in every frame.
+/// All soles stand in every frame.
 inline ContactSchedule always_standing(const BoxCreature& creature, Eigen::Index frames) {
   ContactSchedule contacts;
   for (int leg = 1; leg < 5; ++leg) {
@@ -123,11 +140,12 @@ inline ContactSchedule always_standing(const BoxCreature& creature, Eigen::Index
     for (std::size_t p = 0; p < creature.patch_bone.size(); ++p) {
       if (creature.patch_bone[p] == leg) patch.points.push_back(static_cast<int>(p));
     }
+    if (patch.points.empty()) continue;
     contacts.patches.push_back(patch);
     contacts.state.emplace_back(static_cast<std::size_t>(frames), ContactState::kStick);
   }
   contacts.touching = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>::Constant(creature.scene.contact_points.count(), frames, true);
-  contacts.sliding_x = contacts.sliding_z = Eigen::MatrixXd::Zero(4, frames);
+  contacts.sliding_x = contacts.sliding_z = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(contacts.patches.size()), frames);
   return contacts;
 }
 

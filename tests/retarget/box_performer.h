@@ -6,8 +6,8 @@
 
 namespace hydrostat::retarget {
 
-/// The box as its replays need it, bobbing on its four soles; its skin is two triangles in the first tets.
-inline Performer make_box_performer(Eigen::Index frames = 12, const BoxCreature& creature = make_box_creature()) {
+/// The box as its replays need it, bobbing on its soles by a share of its height; its skin is two triangles in the first tets.
+inline Performer make_box_performer(Eigen::Index frames = 12, const BoxCreature& creature = make_box_creature(), double amplitude = 0.03) {
   const physics::Body& body = creature.scene.body;
   Performer performer;
   performer.scene = creature.scene;
@@ -27,7 +27,7 @@ inline Performer make_box_performer(Eigen::Index frames = 12, const BoxCreature&
   performer.contacts.embedding.weights = creature.scene.contact_points.weights;
   performer.contacts.embedding.tets = Eigen::VectorXi::Zero(points);
   performer.muscles = make_muscles(body, creature.skeleton, creature.bone_weights);
-  performer.prepared = as_prepared(bobbing(creature, frames, 0.03), always_standing(creature, frames));
+  performer.prepared = as_prepared(bobbing(creature, frames, amplitude), always_standing(creature, frames));
   performer.prepared.missing_wrench = Eigen::MatrixXd::Zero(6, frames);
   performer.clip_points = point_motion(creature.scene.contact_points, performer.prepared.target);
   performer.clip_skin = performer.prepared.target;

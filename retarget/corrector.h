@@ -56,7 +56,7 @@ struct ContactNow {
 ///
 /// Where a cost to go is known, regulate() takes the place of that target: min_w z' S z + effort |w|^2 + the excess over cones, of
 /// the deviation z after one control step (horizon_s), by the same response, so that what touches counts as it is and not as planned.
-/// Here dv_free has the dashpots' forces too, and the reference is to be CostToGo::settled: internal forces that do not balance there, or some
+/// Here dv_free has the dashpots' forces too, and the difference of forces is to CostToGo::settled: internal forces that do not balance, or some
 /// of them alone, would turn with the body and be taken for a moment on it.
 /// What such steps turn out to miss is taken for a disturbance that lasts a while: of another body, of what the plan left out. It fades
 /// (RegulatorOptions::keep), so that it lessens what a body is off for good and does not end it. Source: Muske, Badgwell, "Disturbance
@@ -71,7 +71,7 @@ class Corrector {
   /// muscles' correction.
   double correct(const physics::State& state, const physics::State& reference, const ContactNow& contact,
                  Eigen::VectorXd& activation);
-  /// The same by what deviations from a settled reference cost from the time [s] on; `heading` turns the motion's first period into this one.
+  /// The same by what deviations cost from the time [s] on; `heading` turns the motion's first period into this one.
   double regulate(const CostToGo& cost, double time_s, const Eigen::Matrix3d& heading, const physics::State& state,
                   const physics::State& reference, const ContactNow& contact, Eigen::VectorXd& activation);
   void reset();

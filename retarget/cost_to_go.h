@@ -52,7 +52,8 @@ class CostToGo {
   const ReducedModes& modes() const { return modes_; }
   /// What the plan itself costs beside a deviation z from it: 2 z' pull.
   const Eigen::VectorXf& pull(double time_s) const { return pulls_[step_at(time_s)]; }
-  /// The planned state of a time moved to where its forces balance (Equilibrium); `heading` turns the motion's first period into the state's.
+  /// The planned state moved by as much as it has to where forces balance (Equilibrium) halfway through the control step that begins at the
+  /// time [s]; `heading` turns the motion's first period into the state's.
   physics::State settled(double time_s, const Eigen::Matrix3d& heading, const physics::State& planned) const;
   /// False where a matrix was no number: there is no regulator for such a motion.
   bool is_sound() const { return is_sound_; }
@@ -81,7 +82,8 @@ CostByStep by_step(const Eigen::MatrixXd& cost, double advance);
 
 /// Riccati's recursion, backwards over the control steps: S = Q + F' S1 F - F' S1 G (W + G' S1 G)^-1 G' S1 F, and T = C' (S1 + r T1) for
 /// a disturbance of each step's end, that is r times as large in the next, with the closed loop C. Steps are linear about moments that
-/// balance (Equilibrium): about the plan itself they would turn a body by what its signals leave. A loop begins a second
+/// balance (Equilibrium): about the plan itself they would turn a body by what its signals leave. By how far such a moment lies off it, the
+/// plan lets a body drift by d, and p = C' (S1 d + p1) tells what that costs beside a deviation. A loop begins a second
 /// ahead, for what lies further off hardly counts; what is played once stands in the end.
 /// Source: Anderson, Moore, "Optimal Control: Linear Quadratic Methods", Prentice Hall, 1990, section 2.4; Bittanti, Colaneri, De Nicolao,
 /// "The periodic Riccati equation", in The Riccati Equation, Springer, 1991.

@@ -15,6 +15,12 @@ Equilibrium::Equilibrium(const physics::Scene& scene, double length)
     : scene_(scene), hold_(contact_stiffness(scene, length, kHoldTime)), forces_(scene.body), matrix_(scene.body) {}
 
 Eigen::Matrix3Xd Equilibrium::missing(const Eigen::Matrix3Xd& acceleration, const PlannedMoment& moment, const Eigen::Matrix3Xd& x) {
+  forces_.set_activation(moment.activation);
+  return missing_as_activated(acceleration, moment, x);
+}
+
+Eigen::Matrix3Xd Equilibrium::missing_as_activated(const Eigen::Matrix3Xd& acceleration, const PlannedMoment& moment,
+                                                   const Eigen::Matrix3Xd& x) const {
   const physics::Body& body = scene_.body;
   const physics::ContactPoints& points = scene_.contact_points;
   Eigen::Matrix3Xd force = (scene_.gravity.replicate(1, x.cols()) - acceleration - (x - moment.state.x) / (kPullTime * kPullTime)) *
@@ -29,8 +35,8 @@ Eigen::Matrix3Xd Equilibrium::missing(const Eigen::Matrix3Xd& acceleration, cons
 }
 
 void Equilibrium::settle(const Eigen::Matrix3Xd& acceleration, PlannedMoment& moment) {
-  forces_.set_activation(moment.activation);
-  Eigen::Matrix3Xd x = moment.state.x;
+  Eigen::Matrix3Xd x = moment.state.x, left = missing(acceleration, moment, x);
+  const double before = left.norm();
   for (int round = 0; round < kRounds; ++round) {
     matrix_.set_zero();
     matrix_.add_mass(scene_.body, 1 / (kPullTime * kPullTime));
@@ -40,11 +46,12 @@ void Equilibrium::settle(const Eigen::Matrix3Xd& acceleration, PlannedMoment& mo
       matrix_.add_contact(scene_.contact_points, p, hold_ * Eigen::Matrix3d::Identity());
     }
     if (!matrix_.factor()) return;
-    Eigen::MatrixXd step = missing(acceleration, moment, x).reshaped();
+    Eigen::MatrixXd step = left.reshaped();
     matrix_.solve_in_place(step);
     x += step.reshaped(3, x.cols());
+    left = missing_as_activated(acceleration, moment, x);
   }
-  if (x.allFinite()) moment.state.x = x;
+  if (left.norm() < before) moment.state.x = x;
 }
 
 }  // namespace hydrostat::retarget

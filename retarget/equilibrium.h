@@ -16,12 +16,14 @@ class Equilibrium {
 
   /// acceleration: 3 x N [m/s2] by plan. What touches by plan is held there, by a spring that is as stiff as a step's contact; what is
   /// left of the balance, as in a flight that does not fall, pulls the body off the plan as if this caught up in a tenth of a second.
-  /// Newton's method on the positive part of the Hessian. Where that has no factor the moment stays.
+  /// Newton's method on the positive part of the Hessian. Where that brings it no nearer to a balance the moment stays.
   void settle(const Eigen::Matrix3Xd& acceleration, PlannedMoment& moment);
-  /// What is missing at each node before it settles, 3 x N [N], at places x off the moment's.
+  /// What the planned moment lacks of its balance at each node where these are at x [m], 3 x N [N].
   Eigen::Matrix3Xd missing(const Eigen::Matrix3Xd& acceleration, const PlannedMoment& moment, const Eigen::Matrix3Xd& x);
 
  private:
+  Eigen::Matrix3Xd missing_as_activated(const Eigen::Matrix3Xd& acceleration, const PlannedMoment& moment, const Eigen::Matrix3Xd& x) const;
+
   const physics::Scene& scene_;
   const double hold_;  // [N/m] of a point that touches
   physics::InternalForces<3> forces_;

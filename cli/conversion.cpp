@@ -140,7 +140,7 @@ void Conversion::fit_rest_lengths(const io::ImportedCharacter& imported, double 
     std::snprintf(text, sizeof text,
                   "the creature %s with the rest lengths of its bind pose, for the clip takes %.0f %% of its constraints more than %.0f %% from them: "
                   "these get the middle of their lengths in the clip, and it strays less than half as far",
-                  performances_.lapse == retarget::Lapse::kFell ? "falls" : "loses the clip's way", 100 * share, 100 * retarget::kMostSpringStrain);
+                  retarget::in_words(performances_.lapse, performances_.main().report).c_str(), 100 * share, 100 * retarget::kMostSpringStrain);
     return text;
   });
 }

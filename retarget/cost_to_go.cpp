@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "retarget/dense_product.h"
 #include "retarget/equilibrium.h"
@@ -87,49 +89,115 @@ class Moments {
   const double step_s_;
 };
 
-/// S, T and p, see find_cost_to_go.
-struct Costs {
-  Eigen::MatrixXd of_deviation, of_disturbance;
-  Eigen::VectorXd pull;
-};
-
 /// A step of the plan.
 struct PlannedStep {
-  LinearStep linear;      // about where forces balance
-  Eigen::VectorXd drift;  // R: what it makes of the speeds of a body on the plan, where they do not
+  LinearStep linear;         // about where forces balance
+  Eigen::Matrix3Xd settling; // [m]: from the plan to there, 3 x N
+  Eigen::VectorXd drift;     // R: what it makes of the speeds of a body on the plan, where they do not
+};
+
+/// All steps of the plan, each found once where the recursion comes by again and again.
+class PlannedSteps {
+ public:
+  PlannedSteps(const RegulatedMotion& motion, const ReducedModes& modes, bool are_kept, Moments& moments)
+      : length_(motion.length),
+        modes_(modes),
+        moments_(moments),
+        linear_(motion.scene, motion.muscles, modes, motion.length, moments.step_s()),
+        known_(static_cast<std::size_t>(are_kept ? moments.steps() : 0)) {}
+
+  PlannedStep at(long k) {
+    if (known_.empty()) return find(k);
+    PlannedStep& step = known_[static_cast<std::size_t>(k)];
+    if (step.drift.size() == 0) step = find(k);
+    return step;
+  }
+
+ private:
+  PlannedStep find(long k) {
+    PlannedStep step;
+    step.linear = linear_.at(moments_.at(k, step.settling));
+    step.drift = step.linear.carry.leftCols(modes_.count()) * (modes_.project * step.settling.reshaped()) / -length_;
+    return step;
+  }
+
+  const double length_;
+  const ReducedModes& modes_;
+  Moments& moments_;
+  LinearSteps linear_;
+  std::vector<PlannedStep> known_;
+};
+
+/// S, T and p of a moment, see find_cost_to_go.
+class Recursion {
+ public:
+  /// Begins where the motion ends. `turn` is what a loop does to the modes from period to period, R x R; none where it does not turn.
+  Recursion(Eigen::Index modes, double mass, const RegulatorOptions& options, std::optional<Eigen::MatrixXd> turn)
+      : options_(options), turn_(std::move(turn)), weights_(2 * modes), disturbed_(Eigen::MatrixXd::Zero(2 * modes, 2 * modes)) {
+    weights_.head(modes).setConstant(options.place / mass);
+    weights_.tail(modes).setConstant(options.speed / mass);
+    cost_ = (kEndWeight * weights_).asDiagonal();
+    pull_.setZero(2 * modes);
+  }
+
+  void go_back(const PlannedStep& planned);
+  /// From the begin of a period to the end of the one before.
+  void pass_seam();
+
+  const Eigen::MatrixXd& cost() const { return cost_; }
+  const Eigen::MatrixXd& disturbed() const { return disturbed_; }
+  const Eigen::VectorXd& pull() const { return pull_; }
+  bool is_sound() const { return cost_.allFinite() && disturbed_.allFinite() && pull_.allFinite(); }
+
+ private:
+  const RegulatorOptions options_;
+  const std::optional<Eigen::MatrixXd> turn_;
+  Eigen::VectorXd weights_, pull_;
+  Eigen::MatrixXd cost_, disturbed_;
 };
 
 /// One step earlier.
-void go_back(const PlannedStep& planned, const Eigen::VectorXd& weights, const RegulatorOptions& options, Costs& costs) {
+void Recursion::go_back(const PlannedStep& planned) {
   const LinearStep& step = planned.linear;
-  Eigen::MatrixXd& cost = costs.of_deviation;
   const Eigen::Index modes = step.drive.rows();
-  const CostByStep next = by_step(cost, step.advance);
+  const CostByStep next = by_step(cost_, step.advance);
   Eigen::MatrixXd carried = product_of_transposed(step.carry, next.of_speeds);  // 2R x R: F^T S P
   carried.topRows(modes) += next.with_step.topRows(modes);
   Eigen::MatrixXd left = product(product_of_transposed(step.drive, next.of_speeds), step.drive);
-  left.diagonal().array() += options.effort;
+  left.diagonal().array() += options_.effort;
   const Eigen::MatrixXd coupled = product(carried, step.drive), gains = left.ldlt().solve(coupled.transpose());
 
-  const Eigen::MatrixXd ahead = cost + options.last * costs.of_disturbance;
+  const Eigen::MatrixXd ahead = cost_ + options_.last * disturbed_;
   const Eigen::MatrixXd ahead_by_step = step.advance * ahead.topRows(modes) + ahead.bottomRows(modes);  // R x 2R: P^T ahead
   const Eigen::MatrixXd closed = step.carry - product(step.drive, gains);
-  costs.of_disturbance = product_of_transposed(closed, ahead_by_step);
-  costs.of_disturbance.topRows(modes) += ahead.topRows(modes);
+  disturbed_ = product_of_transposed(closed, ahead_by_step);
+  disturbed_.topRows(modes) += ahead.topRows(modes);
 
-  const Eigen::VectorXd pull = costs.pull + next.with_step * planned.drift;
-  costs.pull = closed.transpose() * (step.advance * pull.head(modes) + pull.tail(modes));
-  costs.pull.head(modes) += pull.head(modes);
+  const Eigen::VectorXd pull = pull_ + next.with_step * planned.drift;
+  pull_ = closed.transpose() * (step.advance * pull.head(modes) + pull.tail(modes));
+  pull_.head(modes) += pull.head(modes);
 
   const Eigen::MatrixXd by_place = product(next.with_step.topRows(modes), step.carry);  // R x 2R
-  const Eigen::MatrixXd of_places = cost.topLeftCorner(modes, modes);
-  cost = product_of_transposed(step.carry, product(next.of_speeds, step.carry));
-  cost.topRows(modes) += by_place;
-  cost.leftCols(modes) += by_place.transpose();
-  cost.topLeftCorner(modes, modes) += of_places;
-  cost -= product(coupled, gains);
-  cost = (0.5 * (cost + cost.transpose())).eval();
-  cost.diagonal() += weights;
+  const Eigen::MatrixXd of_places = cost_.topLeftCorner(modes, modes);
+  cost_ = product_of_transposed(step.carry, product(next.of_speeds, step.carry));
+  cost_.topRows(modes) += by_place;
+  cost_.leftCols(modes) += by_place.transpose();
+  cost_.topLeftCorner(modes, modes) += of_places;
+  cost_ -= product(coupled, gains);
+  cost_ = (0.5 * (cost_ + cost_.transpose())).eval();
+  cost_.diagonal() += weights_;
+}
+
+void Recursion::pass_seam() {
+  if (!turn_) return;
+  const Eigen::Index modes = turn_->rows();
+  for (Eigen::MatrixXd* cost : {&cost_, &disturbed_}) {
+    for (const Eigen::Index r : {Eigen::Index{0}, modes}) {
+      cost->middleRows(r, modes) = (turn_->transpose() * cost->middleRows(r, modes)).eval();
+      cost->middleCols(r, modes) = (cost->middleCols(r, modes) * *turn_).eval();
+    }
+  }
+  for (const Eigen::Index r : {Eigen::Index{0}, modes}) pull_.segment(r, modes) = (turn_->transpose() * pull_.segment(r, modes)).eval();
 }
 
 /// What a deviation along the modes becomes as the next period sees it, that begins turned by `yaw`, R x R.
@@ -181,57 +249,32 @@ CostToGo find_cost_to_go(const RegulatedMotion& motion, double control_s, const 
   result.disturbed_.resize(result.costs_.size());
   result.pulls_.resize(result.costs_.size());
   result.settling_.resize(result.costs_.size());
-  LinearSteps linear(motion.scene, motion.muscles, result.modes_, motion.length, moments.step_s());
 
-  const double mass = motion.scene.body.mass.sum();
-  const Eigen::Index modes = result.modes_.count();
-  Eigen::VectorXd weights(2 * modes);
-  weights.head(modes).setConstant(options.place / mass);
-  weights.tail(modes).setConstant(options.speed / mass);
-  Costs costs{(kEndWeight * weights).asDiagonal(), Eigen::MatrixXd::Zero(2 * modes, 2 * modes), Eigen::VectorXd::Zero(2 * modes)};
   const long ahead = std::lround(kForgotten / moments.step_s());
-  const Eigen::MatrixXd turn = into_next_period(result.modes_, target.loop ? target.yaw : 0);
-  const auto pass_seam = [&] {
-    if (!target.loop || target.yaw == 0) return;
-    for (Eigen::MatrixXd* cost : {&costs.of_deviation, &costs.of_disturbance}) {
-      for (const Eigen::Index r : {Eigen::Index{0}, modes}) {
-        cost->middleRows(r, modes) = (turn.transpose() * cost->middleRows(r, modes)).eval();
-        cost->middleCols(r, modes) = (cost->middleCols(r, modes) * turn).eval();
-      }
-    }
-    for (const Eigen::Index r : {Eigen::Index{0}, modes}) costs.pull.segment(r, modes) = (turn.transpose() * costs.pull.segment(r, modes)).eval();
-  };
-  std::vector<PlannedStep> known(static_cast<std::size_t>(target.loop && steps <= ahead ? steps : 0));  // a short loop comes by again and again
-  const auto find_step = [&](long k) {
-    Eigen::Matrix3Xd settling;
-    PlannedStep step{linear.at(moments.at(k, settling)), {}};
-    step.drift = step.linear.carry.leftCols(modes) * (result.modes_.project * settling.reshaped()) / -motion.length;
-    if (k % apart == 0 && k < steps) result.settling_[static_cast<std::size_t>(k / apart)] = std::move(settling);
-    return step;
-  };
-  const auto step_at = [&](long k) {
-    if (known.empty()) return find_step(k);
-    PlannedStep& step = known[static_cast<std::size_t>(k)];
-    if (step.drift.size() == 0) step = find_step(k);
-    return step;
-  };
+  PlannedSteps planned(motion, result.modes_, target.loop && steps <= ahead, moments);
+  std::optional<Eigen::MatrixXd> turn;
+  if (target.loop && target.yaw != 0) turn = into_next_period(result.modes_, target.yaw);
+  Recursion recursion(result.modes_.count(), motion.scene.body.mass.sum(), options, std::move(turn));
   if (target.loop) {
     for (long k = ahead - 1; k >= 0; --k) {
-      go_back(step_at(k % steps), weights, options, costs);
-      if (k % steps == 0) pass_seam();
+      recursion.go_back(planned.at(k % steps));
+      if (k % steps == 0) recursion.pass_seam();
     }
   } else {
-    const PlannedStep standing = find_step(steps);
-    for (long k = 0; k < ahead; ++k) go_back(standing, weights, options, costs);
+    const PlannedStep standing = planned.at(steps);
+    for (long k = 0; k < ahead; ++k) recursion.go_back(standing);
   }
   for (long k = steps - 1; k >= 0; --k) {
-    go_back(step_at(k), weights, options, costs);
+    PlannedStep step = planned.at(k);
+    recursion.go_back(step);
     if (k % apart != 0) continue;
-    result.costs_[static_cast<std::size_t>(k / apart)] = costs.of_deviation.cast<float>();
-    result.disturbed_[static_cast<std::size_t>(k / apart)] = costs.of_disturbance.cast<float>();
-    result.pulls_[static_cast<std::size_t>(k / apart)] = costs.pull.cast<float>();
+    const auto place = static_cast<std::size_t>(k / apart);
+    result.costs_[place] = recursion.cost().cast<float>();
+    result.disturbed_[place] = recursion.disturbed().cast<float>();
+    result.pulls_[place] = recursion.pull().cast<float>();
+    result.settling_[place] = std::move(step.settling);
   }
-  result.is_sound_ = costs.of_deviation.allFinite() && costs.of_disturbance.allFinite() && costs.pull.allFinite();
+  result.is_sound_ = recursion.is_sound();
   return result;
 }
 

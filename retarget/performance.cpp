@@ -13,7 +13,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kErrorSeconds = 1;  // at most, over which the substep's error is measured
-constexpr double kLeastTravel = 0.05;  // of L a cycle, of a clip that travels
+constexpr double kOffPlace = 0.05;     // of L (RMS), from which a clip that stays where it is has lost its place
 constexpr double kOffTravel = 0.08;    // of it, more or less, from which its way is lost
 constexpr double kOffDrift = 0.04;     // likewise of drift a cycle: measured, what is well drifts by 1.3 % at most, what staggers by 5 % and more
 constexpr double kLeastCycles = 4;     // of a loop, which tell its drift
@@ -212,12 +212,19 @@ Performances perform(const Performer& performer, const SignalSet& signals, const
   return perform(Act(performer, signals), options);
 }
 
+bool travels(const ReplayReport& run) { return run.clip_travel_per_cycle_length >= kLeastTravel; }
+
+double off_place(const ReplayReport& run) {
+  return std::sqrt(std::max(0.0, run.world_rms_length * run.world_rms_length - run.shape_rms_length * run.shape_rms_length));
+}
+
 double straying(const Performer& performer, const ReplayOptions& options, const Replay& run) {
   const ReplayReport& report = run.report;
   const Motion& target = performer.prepared.target;
   const double way = report.clip_travel_per_cycle_length;
   if (report.fell || run.termination != physics::Termination::kDone) return HUGE_VAL;
-  if (!is_as_planned(performer, options) || way < kLeastTravel || report.cycles < 1 - 1e-6) return 0;
+  if (!is_as_planned(performer, options) || report.cycles < 1 - 1e-6) return 0;
+  if (!travels(report)) return off_place(report) / kOffPlace;
   const bool turns = std::abs(target.yaw) * report.cycles > kCircle;
   const bool tells_drift = !target.loop || report.cycles > kLeastCycles - 1e-6;
   const double travel = turns ? 0 : std::abs(report.travel_per_cycle_length - way) / (kOffTravel * way);

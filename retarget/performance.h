@@ -119,13 +119,21 @@ physics::Scene varied_scene(const physics::Scene& scene, const Variation& variat
 Performances perform(const Act& act, const PerformOptions& options);
 Performances perform(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
 
+/// Whether its clip goes anywhere; else it stays, more or less, in its place.
+bool travels(const ReplayReport& run);
+constexpr double kLeastTravel = 0.05;  // [L a cycle] of a clip that does
+
+/// How far [per L, RMS over run and body] the body is from where its target is, turned or not, without what is off in its shape.
+double off_place(const ReplayReport& run);
+
 /// How far a run is off the clip's way, in units of what loses it (lapse_of); infinite where it is down.
 double straying(const Performer& performer, const ReplayOptions& options, const Replay& run);
 constexpr double kBetter = 0.5;  // share of the straying that anything but the usual is worth its while from
 
-/// Whether it fell or diverged, or lost its way: travels by over 8 % of the clip's travel more or less than that, or drifts by over 4 % of
-/// it a cycle (of a loop of four cycles or more). Only what travels has a way to lose, over level ground and undisturbed, without scene or push, for a
-/// cycle at least; of a loop that turns its drift alone counts.
+/// Whether it fell or diverged, or lost its way. What travels has lost it that travels by over 8 % of the clip's travel more or less than that,
+/// or drifts by over 4 % of it a cycle (of a loop of four cycles or more); of a loop that turns its drift alone counts. What does not travel
+/// has lost it that is over 5 % of L off its place. Only over level ground and undisturbed, without scene or push, there is a way to
+/// lose, and after a cycle at least.
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
 
 /// What became of kTrials.

@@ -46,6 +46,7 @@ std::string in_words(const Feedback& feedback) {
 }
 
 std::string way_in_words(const ReplayReport& report) {
+  if (!travels(report)) return sentence("is %.0f %% L (RMS) off its place", 100 * off_place(report));
   const std::string way = sentence("makes %.0f %% of the clip's way", 100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length);
   return std::isnan(report.drift_per_cycle_length) ? way : way + sentence(" and drifts %.2g %% L a cycle", 100 * report.drift_per_cycle_length);
 }
@@ -97,6 +98,12 @@ std::vector<std::string> inverse_warnings(const InverseReport& inverse) {
   return warnings;
 }
 
+std::string in_words(Lapse lapse, const ReplayReport& run) {
+  if (lapse == Lapse::kNothing) return "keeps up";
+  if (lapse == Lapse::kFell) return "falls";
+  return travels(run) ? "loses its way" : "loses its place";
+}
+
 std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished) {
   const bool is_lost = performances.lapse == Lapse::kLostWay, fell = performances.wished_lapse == Lapse::kFell;
   const bool was_well = performances.wished_lapse == Lapse::kNothing;
@@ -108,7 +115,7 @@ std::vector<std::string> feedback_warnings(const Performances& performances, con
     return {"feedback: " + lost + ", and fewer by no regulator"};
   }
   const std::string usual = wished == Feedback() ? "the usual gain" : "its own gain";
-  const std::string lapse = was_well ? "loses bodies off the plan" : fell ? "falls" : "loses its way";
+  const std::string lapse = was_well ? "loses bodies off the plan" : in_words(performances.wished_lapse, performances.main().report);
   const std::string instead = was_well ? "keeps more of them " : fell ? "stays up " : is_lost ? "strays less " : "keeps it ";
   const std::string taken = "feedback: on " + usual + " the creature " + lapse + ", it " + instead + in_words(performances.feedback);
   if (is_lost) return {taken + ", but " + way_in_words(performances.main().report)};

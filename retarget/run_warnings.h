@@ -16,6 +16,9 @@ std::vector<std::string> target_warnings(const PreparedTarget& prepared, const p
 /// The same about what the inverse dynamics found.
 std::vector<std::string> inverse_warnings(const InverseReport& inverse);
 
+/// As what the creature of such a run does: "falls", "loses its way", or its place where its clip has none to go.
+std::string in_words(Lapse lapse, const ReplayReport& run);
+
 /// Which feedback took the place of what was wished (perform_steadily) and why, or that a creature loses its way on any; none where what
 /// was wished will do, nor of a fall, which is told elsewhere.
 std::vector<std::string> feedback_warnings(const Performances& performances, const Feedback& wished = {});

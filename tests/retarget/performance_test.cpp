@@ -322,6 +322,27 @@ TEST(LapseOf, IsAFallOrTravelThatIsOverEightOrDriftOverFourPerCentOfTheWay) {
   EXPECT_EQ(lapse_of(performer, {}, diverged), Lapse::kFell);
 }
 
+/// What travels has its way for that, and may be ahead or behind.
+TEST(LapseOf, OfWhatStaysIsAPlaceThatIsOffByOverAFewPerCentOfLength) {
+  const Performer performer = make_box_performer();
+  const auto off = [](double way, double place, double shape) {
+    Replay run = way_made(1, way);
+    run.report.world_rms_length = std::hypot(place, shape);
+    run.report.shape_rms_length = shape;
+    return run;
+  };
+  for (const double way : {0.0, 0.049}) {
+    for (const double shape : {0.0, 0.02, 0.3}) {
+      EXPECT_EQ(lapse_of(performer, {}, off(way, 0.049, shape)), Lapse::kNothing) << way << ", " << shape;
+      EXPECT_EQ(lapse_of(performer, {}, off(way, 0.051, shape)), Lapse::kLostWay) << way << ", " << shape;
+    }
+  }
+  EXPECT_EQ(lapse_of(performer, {}, off(0.051, 0.5, 0)), Lapse::kNothing);
+  Performer in_scene = performer;
+  in_scene.world.decisions.emplace_back();
+  EXPECT_EQ(lapse_of(in_scene, {}, off(0, 0.5, 0)), Lapse::kNothing) << "a scene";
+}
+
 TEST(LapseOf, AsksForNoWayWhereNoneIsPlannedOrNoneWasGone) {
   const Replay lost = way_made(0.5);
   const Performer plain = make_box_performer();

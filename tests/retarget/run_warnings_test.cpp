@@ -121,6 +121,18 @@ TEST(FeedbackWarnings, LeaveADriftOutThatCannotBeTold) {
   EXPECT_EQ(feedback_warnings(lost).front(), "feedback: the creature makes 80 % of the clip's way, and strays half as far on no other gain");
 }
 
+TEST(FeedbackWarnings, TellOfALostPlaceWhereTheClipGoesNowhere) {
+  Performances lost = performances_of(0, {}, Lapse::kLostWay, Lapse::kLostWay);
+  ReplayReport& run = lost.closed_loop->report;
+  run.clip_travel_per_cycle_length = 0.04;
+  run.shape_rms_length = 0.3;
+  run.world_rms_length = std::hypot(0.3, 0.19);
+  EXPECT_EQ(feedback_warnings(lost).front(), "feedback: the creature is 19 % L (RMS) off its place, and strays half as far on no other gain");
+  lost.feedback = {16, 1, 1};
+  EXPECT_EQ(feedback_warnings(lost).front(), "feedback: on the usual gain the creature loses its place, it strays less where effort is 16 times as dear "
+                                             "as usual, but is 19 % L (RMS) off its place");
+}
+
 TEST(MotionWarnings, TellOfWhatCarriedTheCreatureAndOfAStrangeShape) {
   ReplayReport run;
   run.guard_steps = 469;

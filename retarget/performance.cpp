@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kErrorSeconds = 1;  // at most, over which the substep's error is measured
 constexpr double kOffPlace = 0.05;     // of L (RMS), from which a clip that stays where it is has lost its place
+constexpr double kOffTurn = 0.3;       // [deg], by which what is played once ends turned
 constexpr double kOffTravel = 0.08;    // of it, more or less, from which its way is lost
 constexpr double kOffDrift = 0.04;     // likewise of drift a cycle: measured, what is well drifts by 1.3 % at most, what staggers by 5 % and more
 constexpr double kLeastCycles = 4;     // of a loop, which tell its drift
@@ -224,12 +225,13 @@ double straying(const Performer& performer, const ReplayOptions& options, const 
   const double way = report.clip_travel_per_cycle_length;
   if (report.fell || run.termination != physics::Termination::kDone) return HUGE_VAL;
   if (!is_as_planned(performer, options) || report.cycles < 1 - 1e-6) return 0;
-  if (!travels(report)) return off_place(report) / kOffPlace;
-  const bool turns = std::abs(target.yaw) * report.cycles > kCircle;
+  const double turn = target.loop ? 0 : std::abs(report.heading_deg_per_cycle) / kOffTurn;
+  if (!travels(report)) return std::max(off_place(report) / kOffPlace, turn);
+  const bool is_circle = std::abs(target.yaw) * report.cycles > kCircle;
   const bool tells_drift = !target.loop || report.cycles > kLeastCycles - 1e-6;
-  const double travel = turns ? 0 : std::abs(report.travel_per_cycle_length - way) / (kOffTravel * way);
+  const double travel = is_circle ? 0 : std::abs(report.travel_per_cycle_length - way) / (kOffTravel * way);
   const double drift = tells_drift ? report.drift_per_cycle_length / (kOffDrift * way) : 0;
-  return std::max(travel, drift);
+  return std::max({travel, drift, turn});
 }
 
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run) {

@@ -14,6 +14,7 @@ constexpr double kOverLimit = 1.5;       // of the limit
 constexpr double kSaturated = 0.05;      // share of the activations
 constexpr double kMiss = 3e-4;           // per L
 constexpr double kRootResidual = 0.01;   // [m g]
+constexpr double kNoTurn = 0.05;         // [deg a cycle] that is not told
 constexpr double kFarFromClip = 0.1;     // of L: the eye no longer sees the same motion
 
 template <typename... Numbers>
@@ -46,9 +47,15 @@ std::string in_words(const Feedback& feedback) {
 }
 
 std::string way_in_words(const ReplayReport& report) {
-  if (!travels(report)) return sentence("is %.0f %% L (RMS) off its place", 100 * off_place(report));
+  const double drift = report.drift_per_cycle_length, turn = std::abs(report.heading_deg_per_cycle);
+  const bool tells_turn = turn > kNoTurn;
+  if (!travels(report)) {
+    return sentence("is %.0f %% L (RMS) off its place", 100 * off_place(report)) + (tells_turn ? sentence(" and turns by %.1f degrees a cycle", turn) : "");
+  }
   const std::string way = sentence("makes %.0f %% of the clip's way", 100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length);
-  return std::isnan(report.drift_per_cycle_length) ? way : way + sentence(" and drifts %.2g %% L a cycle", 100 * report.drift_per_cycle_length);
+  if (std::isnan(drift)) return way;
+  if (tells_turn) return way + sentence(", drifts %.2g %% L and turns by %.1f degrees a cycle", 100 * drift, turn);
+  return way + sentence(" and drifts %.2g %% L a cycle", 100 * drift);
 }
 
 }  // namespace

@@ -121,6 +121,21 @@ TEST(FeedbackWarnings, LeaveADriftOutThatCannotBeTold) {
   EXPECT_EQ(feedback_warnings(lost).front(), "feedback: the creature makes 80 % of the clip's way, and strays half as far on no other gain");
 }
 
+TEST(FeedbackWarnings, TellOfATurn) {
+  Performances lost = performances_of(0.5, {}, Lapse::kLostWay, Lapse::kLostWay);
+  double& turn = lost.closed_loop->report.heading_deg_per_cycle;
+  for (const double degrees : {0.94, -0.94}) {
+    turn = degrees;
+    EXPECT_EQ(feedback_warnings(lost).front(),
+              "feedback: the creature makes 100 % of the clip's way, drifts 2.5 % L and turns by 0.9 degrees a cycle, and strays half as far on no other gain");
+  }
+  lost.closed_loop->report.clip_travel_per_cycle_length = 0.04;
+  EXPECT_EQ(feedback_warnings(lost).front(),
+            "feedback: the creature is 0 % L (RMS) off its place and turns by 0.9 degrees a cycle, and strays half as far on no other gain");
+  turn = 0.04;
+  EXPECT_EQ(feedback_warnings(lost).front(), "feedback: the creature is 0 % L (RMS) off its place, and strays half as far on no other gain");
+}
+
 TEST(FeedbackWarnings, TellOfALostPlaceWhereTheClipGoesNowhere) {
   Performances lost = performances_of(0, {}, Lapse::kLostWay, Lapse::kLostWay);
   ReplayReport& run = lost.closed_loop->report;

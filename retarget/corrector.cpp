@@ -50,28 +50,30 @@ void Corrector::reset() {
   responses_.forget();
 }
 
+/// What comes of velocities that are so far off, and of the forces beyond the reference's.
+void Corrector::solve_free_deviation(const Eigen::Matrix3Xd& velocity) {
+  deviation_ = (velocity * scene_.body.mass.asDiagonal() + options_.horizon_s * (force_ - reference_force_)).reshaped();
+  responses_.solve_in_place(deviation_);
+}
+
 /// What comes without any muscle.
 void Corrector::find_free_deviation(const physics::State& state, const physics::State& reference) {
-  const physics::Body& body = scene_.body;
-  force_.setZero(3, body.node_count());
-  reference_force_.setZero(3, body.node_count());
+  force_.setZero(3, scene_.body.node_count());
+  reference_force_.setZero(3, scene_.body.node_count());
   forces_.add_elastic_forces(state.x, force_);
   forces_.add_elastic_forces(reference.x, reference_force_);
-  deviation_ = ((state.v - reference.v) * body.mass.asDiagonal() + options_.horizon_s * (force_ - reference_force_)).reshaped();
-  responses_.solve_in_place(deviation_);
+  solve_free_deviation(state.v - reference.v);
 }
 
 /// The same by all forces halfway through the step, where those of the `settled` reference balance; dashpots count as they turn with
 /// the body.
 void Corrector::find_free_deviation_of_settled(const physics::State& state, const physics::State& settled) {
-  const physics::Body& body = scene_.body;
-  force_.setZero(3, body.node_count());
-  reference_force_.setZero(3, body.node_count());
+  force_.setZero(3, scene_.body.node_count());
+  reference_force_.setZero(3, scene_.body.node_count());
   const Eigen::Matrix3Xd ahead = 0.5 * options_.horizon_s * settled.v;
   forces_.add_forces({state.x + ahead, settled.v}, force_);
   forces_.add_forces({settled.x + ahead, settled.v}, reference_force_);
-  deviation_ = ((state.v - settled.v) * body.mass.asDiagonal() + options_.horizon_s * (force_ - reference_force_)).reshaped();
-  responses_.solve_in_place(deviation_);
+  solve_free_deviation(state.v - settled.v);
 }
 
 /// Velocity of the centre of mass, and the body's turning as the speed at its radius of gyration. Returns how far all six are off, as

@@ -83,6 +83,7 @@ class Corrector {
   double least_margin() const;
 
  private:
+  void solve_free_deviation(const Eigen::Matrix3Xd& velocity);
   void find_free_deviation(const physics::State& state, const physics::State& reference);
   void find_free_deviation_of_settled(const physics::State& state, const physics::State& settled);
   double weigh_momentum(const physics::State& state, const ContactNow& contact);

@@ -9,7 +9,7 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kTimes[] = {1.0 / 120, 1.0 / 30, 0.1, 0.3};  // [s] for which something acts; without the last, what moves slowly grows unseen
+constexpr double kTimes[] = {1.0 / 120, 1.0 / 30, 0.1, 0.15};  // [s] for which something acts; without the last, what moves slowly grows unseen
 constexpr double kRigidShare = 100;  // a rigid move counts as so many answers: it must not be lost
 
 /// Sums the answers, each as one.

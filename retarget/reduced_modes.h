@@ -27,7 +27,7 @@ struct ReducedModes {
 };
 
 /// The `most` ways in which a body moves most where its muscles, its contact points and rigid moves act on it in some moments of a
-/// motion, for times from a substep's to a slow sway's (1/120 to 0.3 s): principal components by kinetic energy, each answer counting alike. Those modes have
+/// motion, for times from a substep's to a slow sway's (1/120 to 0.15 s): principal components by kinetic energy, each answer counting alike. Those modes have
 /// the body's own compliance, as bones' rigid moves have not. Contact holds as MuscleResponse has it.
 /// Source: Sirovich, "Turbulence and the dynamics of coherent structures", Quarterly of Applied Mathematics 45(3), 1987 (snapshots);
 /// that the snapshots are answers to what drives the body is ours.

@@ -125,7 +125,7 @@ TEST(ReducedModes, AreOrthonormalByMassAndHaveAllRigidMovesAndAllThatMusclesDo) 
 }
 
 /// What muscles do slowly to a soft body, too: without it a creature of 250 nodes that stood on its toes slid apart over 15 s. Of a box so soft
-/// that it swings at a few Hz 0.17 of an answer is lost at most, and 0.21 where modes are answers of up to 0.1 s.
+/// that it swings at a few Hz less than 0.19 of an answer is lost, and 0.21 where modes are answers of up to 0.1 s.
 TEST(ReducedModes, HaveWhatMusclesDoSlowly) {
   Regulated box;
   physics::Scene& scene = box.performer.scene;
@@ -314,7 +314,7 @@ Performer turning_box(double yaw) {
 /// What a loop that turns has left over at its end costs what it costs in the next period, which begins turned: seen as a replay sees it.
 TEST(CostToGo, PassesTheSeamOfATurningLoop) {
   constexpr int kModes = 60;
-  constexpr double kFarOff = 0.03;  // share of the costs that lies further ahead than a second
+  constexpr double kFarOff = 0.02;  // share of the costs that lies further ahead than a second
   for (const double yaw : {0.3, -0.5, 0.7}) {
     SCOPED_TRACE("yaw " + std::to_string(yaw));
     Regulated box(turning_box(yaw));
@@ -322,6 +322,7 @@ TEST(CostToGo, PassesTheSeamOfATurningLoop) {
     box.off = 0.02 * random_vector(box.off.size(), noise);
     RegulatorOptions options;
     options.modes = kModes;
+    options.effort = 1e-4;  // most of it is met within that second
     options.place = 0;  // a place that nothing brings back would cost the more the further one looks ahead
     const CostToGo cost = find_cost_to_go(box.motion(), kStep, options);
     ASSERT_TRUE(cost.is_sound());
@@ -600,7 +601,6 @@ TEST(Regulator, HoldsWhatStandsOnALine) {
         EXPECT_LE(report.held_slip_per_stance_length, 1e-6);
         EXPECT_LE(report.angular_residual_mgl, 1e-6);
       }
-      options.seed = 0;
     }
     options.feedback = {};
   }

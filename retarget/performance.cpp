@@ -92,10 +92,11 @@ Lapse lapse_of(double straying) {
   return straying > 1 ? Lapse::kLostWay : Lapse::kNothing;
 }
 
-/// Whether a body off the plan falls, or loses the way of its loop; where a single run ends hangs on the body.
+/// Whether a body off the plan falls, or loses the way of its loop; where a single run ends hangs on the body, within a few per cent of L.
 bool is_lost(const Performer& performer, const PerformOptions& options, const Replay& run) {
   if (run.report.fell || run.termination != physics::Termination::kDone) return true;
-  return performer.prepared.target.loop && straying(performer, options.replay, run) > 1;
+  if (performer.prepared.target.loop) return straying(performer, options.replay, run) > 1;
+  return is_as_planned(performer, options.replay) && run.report.drift_per_cycle_length > kOffPlace;
 }
 
 /// The `first` of kTrials and the next, side by side.

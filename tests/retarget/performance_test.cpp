@@ -253,6 +253,16 @@ TEST(CountTrialsLost, IsNoneOfWhatStandsAndAllOfWhatFalls) {
   EXPECT_EQ(go_on_trials(performer, signals, options).lost, lost);
 }
 
+/// A single run of a body off the plan may end a little beside its place, but not by a tenth of L, as what is shoved on ice.
+TEST(CountTrialsLost, IsAllOfWhatIsPlayedOnceAndEndsFarOff) {
+  Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  performer.prepared.target.loop = false;
+  EXPECT_EQ(go_on_trials(performer, signals, lasting(0.35)).lost, 0);
+  performer.scene.ground.friction = 0.005;
+  EXPECT_EQ(go_on_trials(performer, signals, lasting(0.35)).lost, static_cast<int>(kTrials.size()));
+}
+
 /// The box as it glides over ground that hardly holds it, so far that gains differ in how far.
 Performer make_gliding_performer() {
   constexpr double kWay = 0.1;  // [m] a period

@@ -132,13 +132,13 @@ constexpr double kBetter = 0.5;  // share of the straying that anything but the 
 
 /// Whether it fell or diverged, or lost its way. What travels has lost it that travels by over 8 % of the clip's travel more or less than that,
 /// or drifts by over 4 % of it a cycle (of a loop of four cycles or more); of a loop that turns its drift alone counts. What does not travel
-/// has lost it that is over 5 % of L off its place; and what is played once, that ends turned by over 0.3 degrees. Only over level ground and undisturbed, without scene or push, there is a way to
-/// lose, and after a cycle at least.
+/// has lost it that is over 5 % of L off its place; and what is played once, that ends turned by over 0.3 degrees. Only over level ground and
+/// undisturbed, without scene or push, there is a way to lose, and after a cycle at least.
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
 
 /// What became of kTrials.
 struct TrialsOutcome {
-  int lost = 0;                 // that fell or diverged, or lost the way of their loop (lapse_of)
+  int lost = 0;                 // that fell or diverged, lost the way of their loop (lapse_of), or ended a single run over 5 % of L off its place
   double shape_rms_length = 0;  // as in ReplayReport, the mean of all, as long as they went
 };
 /// Lets kTrials go by the options' feedback, as long as the options have it.

@@ -253,7 +253,7 @@ TEST(CountTrialsLost, IsNoneOfWhatStandsAndAllOfWhatFalls) {
   EXPECT_EQ(go_on_trials(performer, signals, options).lost, lost);
 }
 
-/// A single run of a body off the plan may end a little beside its place, but not by a tenth of L, as what is shoved on ice.
+/// A single run of a body off the plan may end a little beside its place, but not by over a twentieth of L, as what is shoved on ice.
 TEST(CountTrialsLost, IsAllOfWhatIsPlayedOnceAndEndsFarOff) {
   Performer performer = make_box_performer();
   const SignalSet signals = signals_of(performer);

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kCommand = "hydrostat bench accuracy";
+constexpr const char* kAccuracyCommand = "hydrostat bench accuracy";
 constexpr double kParts[] = {0.25, 0.5, 1, 2};  // of the scene's number of nodes
 constexpr double kFinest = 4;                   // the reference's
 constexpr double kFinerMesh = 1.7;    // what is left of a mesh's error over its change from half the nodes, of second order
@@ -81,7 +81,7 @@ void refuse_below_floor(const std::string& max_error, double most, double floor)
   char text[160];
   std::snprintf(text, sizeof text, "the reference itself is only known within %.2g %% of L, so that %.2g %% cannot be told",
                 100 * floor, 100 * most);
-  throw UsageError(kCommand, "option --max-error", text, "Ask for a larger error.");
+  throw UsageError(kAccuracyCommand, "option --max-error", text, "Ask for a larger error.");
 }
 
 class Bench {
@@ -89,7 +89,7 @@ class Bench {
   Bench(const AccuracyCommand& command, Progress& progress) : command_(command), progress_(progress) {
     curve_.subject = fs::path(command.subject).filename().string();
     curve_.max_error = kUsualError;
-    if (!command.max_error.empty()) curve_.max_error = parse_share(command.max_error, kCommand, "--max-error");
+    if (!command.max_error.empty()) curve_.max_error = parse_share(command.max_error, kAccuracyCommand, "--max-error");
     options_.duration_s = command.duration;
   }
 

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kCommand = "hydrostat bench speed";
+constexpr const char* kSpeedCommand = "hydrostat bench speed";
 constexpr int kTimes = 5;  // of reading
 constexpr const char* kSmallClip =
     "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\nJOINT b\n{\nOFFSET 0 1 0\n"
@@ -90,7 +90,7 @@ double ms_of(Result& result, const Work& work) {
 std::vector<int> wished_nodes(const std::string& list) {
   std::vector<int> nodes;
   for (const std::string& part : CLI::detail::split(list, ','))
-    nodes.push_back(static_cast<int>(parse_number(part, 20, 5000, kCommand, "--nodes")));
+    nodes.push_back(static_cast<int>(parse_number(part, 20, 5000, kSpeedCommand, "--nodes")));
   return nodes;
 }
 

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kCommand = "hydrostat compare";
+constexpr const char* kCompareCommand = "hydrostat compare";
 constexpr int kMost = 6;  // more are too small beside each other
 
 struct CompareCommand {
@@ -74,7 +74,7 @@ std::string distance_line(const io::Comparison& comparison, std::size_t k) {
   return name + ": its skin is away from that of " + first + " by " + text;
 }
 
-UsageError usage(const std::string& what, const std::string& mend) { return {kCommand, "command line", what, mend}; }
+UsageError usage(const std::string& what, const std::string& mend) { return {kCompareCommand, "command line", what, mend}; }
 
 void check_subjects(const std::vector<std::string>& subjects) {
   if (subjects.size() < 2) throw usage("there is nothing to compare with", "Name two creatures or more.");
@@ -93,14 +93,14 @@ void check_subjects(const std::vector<std::string>& subjects) {
 int compare(const CompareCommand& command) {
   check_subjects(command.subjects);
   if (!command.out.empty() && fs::path(command.out).extension() != ".html") {
-    throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .html",
+    throw UsageError(kCompareCommand, "option --out", "'" + command.out + "' does not end with .html",
                      "The comparison is written as a page.");
   }
   const io::Comparison comparison = io::compare_runs(command.subjects);
   if (!command.out.empty()) {
     for (const io::ComparedRun& run : comparison.runs) {
       if (fs::weakly_canonical(run.page.file) != fs::weakly_canonical(command.out)) continue;
-      throw UsageError(kCommand, "option --out", "'" + command.out + "' is one of the pages that are compared",
+      throw UsageError(kCompareCommand, "option --out", "'" + command.out + "' is one of the pages that are compared",
                        "Name another file.");
     }
     io::write_comparison_page(command.out, comparison);

@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kCommand = "hydrostat replay";
+constexpr const char* kReplayCommand = "hydrostat replay";
 constexpr double kLongest = 600;       // [s] of a replay
 constexpr double kFastestPush = 100;   // [m/s] along an axis
 
@@ -49,7 +49,7 @@ struct ReplayCommand {
 };
 
 UsageError push_error(const std::string& text, const std::string& what) {
-  return {kCommand, "option --push", "'" + text + "' " + what, "Write it like t=2,dv=0.3:0:0 (seconds, metres per second)."};
+  return {kReplayCommand, "option --push", "'" + text + "' " + what, "Write it like t=2,dv=0.3:0:0 (seconds, metres per second)."};
 }
 
 /// "t=2,dv=0.3:0:0".
@@ -58,13 +58,13 @@ retarget::Push parse_push(const std::string& text, double duration_s) {
   bool has_time = false, has_speed = false;
   for (const std::string& part : CLI::detail::split(text, ',')) {
     if (part.starts_with("t=")) {
-      push.time_s = parse_number(part.substr(2), 0, kLongest, kCommand, "--push t");
+      push.time_s = parse_number(part.substr(2), 0, kLongest, kReplayCommand, "--push t");
       has_time = true;
     } else if (part.starts_with("dv=")) {
       const std::vector<std::string> axes = CLI::detail::split(part.substr(3), ':');
       if (axes.size() != 3) throw push_error(text, "has not three speeds in dv");
       for (std::size_t k = 0; k < 3; ++k) {
-        push.delta_v[static_cast<Eigen::Index>(k)] = parse_number(axes[k], -kFastestPush, kFastestPush, kCommand, "--push dv");
+        push.delta_v[static_cast<Eigen::Index>(k)] = parse_number(axes[k], -kFastestPush, kFastestPush, kReplayCommand, "--push dv");
       }
       has_speed = true;
     } else {
@@ -84,7 +84,7 @@ int steps_per_row(const ReplayCommand& command, const retarget::ReplayOptions& o
   if (every < 1 - 1e-9 || std::abs(every - std::round(every)) > 1e-6) {
     char text[120];
     std::snprintf(text, sizeof text, "%g Hz is not a whole part of the %g Hz at which the replay is controlled", command.trace_rate, control_hz);
-    throw UsageError(kCommand, "option --trace-rate", text, "Give 120, 60, 40, 30, ...");
+    throw UsageError(kReplayCommand, "option --trace-rate", text, "Give 120, 60, 40, 30, ...");
   }
   return static_cast<int>(std::lround(every));
 }
@@ -99,7 +99,7 @@ retarget::PerformOptions perform_options(const ReplayCommand& command, const io:
                               : command.cycles > 0 ? command.cycles * target.duration_s()
                                                    : retarget::usual_duration(target);
   if (options.replay.duration_s > kLongest) {
-    throw UsageError(kCommand, "option --cycles", "so many cycles last longer than 600 s", "Give fewer.");
+    throw UsageError(kReplayCommand, "option --cycles", "so many cycles last longer than 600 s", "Give fewer.");
   }
   for (const std::string& push : command.pushes) options.replay.pushes.push_back(parse_push(push, options.replay.duration_s));
   options.replay.trace = !command.trace.empty();
@@ -138,7 +138,7 @@ retarget::PerformOptions in_its_world(retarget::PerformOptions options, const re
 io::Exports exports_of(const ReplayCommand& command, const io::CreatureRecord& record) {
   io::Exports otherwise = io::exports_of(record);
   if (!command.out.empty()) otherwise = {.rate_hz = otherwise.rate_hz};
-  return exports_of(command.exports, otherwise, kCommand);
+  return exports_of(command.exports, otherwise, kReplayCommand);
 }
 
 /// The motion alone, for -o.
@@ -172,10 +172,10 @@ class Levels {
     if (!command.level.is_asked()) return;
     solved_ = creature;
     rig_ = io::load_rig(command.directory, creature);
-    all_ = stages.run("levels", [&] { return levels_asked_among(command.level, kCommand, creature, rig_, options.replay); });
-    levels_ = levels_within(all_, command.level, kCommand);
+    all_ = stages.run("levels", [&] { return levels_asked_among(command.level, kReplayCommand, creature, rig_, options.replay); });
+    levels_ = levels_within(all_, command.level, kReplayCommand);
     is_costed_ = all_.front().work_ms > 0;
-    if (levels_.empty()) throw no_level_within(kCommand, budget_ms(command.level, kCommand), all_, trial_above(0));
+    if (levels_.empty()) throw no_level_within(kReplayCommand, budget_ms(command.level, kReplayCommand), all_, trial_above(0));
     take(creature);
   }
   /// What to do where the creature is down on the level that was taken; empty where that is not known.
@@ -186,7 +186,7 @@ class Levels {
     } catch (const Error&) {  // a level that was not asked for
       return "";
     }
-    const double taken_ms = creature.target.report.level->work_ms, budget = budget_ms(command_.level, kCommand);
+    const double taken_ms = creature.target.report.level->work_ms, budget = budget_ms(command_.level, kReplayCommand);
     return cli::way_up(trial_above(std::max(taken_ms, budget)), budget > 0);
   }
   /// Where the present one kept too little of the clip's way: the next coarser one, after the last the best of them, with a word on
@@ -214,7 +214,7 @@ class Levels {
     return text + word;
   }
   void take(io::LoadedCreature& creature) {
-    creature = stages_.run("level", [&] { return at_level(solved_, rig_, levels_[taken_], command_.level, kCommand); });
+    creature = stages_.run("level", [&] { return at_level(solved_, rig_, levels_[taken_], command_.level, kReplayCommand); });
     if (is_costed_) return;
     const retarget::Performer& performer = creature.target.performer;
     creature.target.report.level->work_ms = retarget::frame_work_ms(performer.scene, performer.muscles.fields.cols(), options_.replay);
@@ -231,7 +231,7 @@ class Levels {
     return stages_.run("other levels", [&] { return try_levels(all_, work_ms, own_nodes, options_.replay.duration_s, keeps_way); });
   }
   retarget::Replay replay_of(const retarget::LevelCost& level) const {
-    io::LoadedCreature creature = at_level(solved_, rig_, level, command_.level, kCommand);
+    io::LoadedCreature creature = at_level(solved_, rig_, level, command_.level, kReplayCommand);
     put_in_scene(command_, creature);
     retarget::PerformOptions options = in_its_world(options_, creature.target.performer);
     options.baselines = options.replay.trace = false;
@@ -298,7 +298,7 @@ void refuse_own_motion(const ReplayCommand& command) {
   for (const char* name : {"replay.glb", "failed.glb", "reference.glb"}) {
     std::error_code ignored;  // what cannot be resolved is refused where it is read or written
     if (fs::weakly_canonical(command.out, ignored) != fs::weakly_canonical(fs::path(command.directory) / name, ignored)) continue;
-    throw UsageError(kCommand, "option --out", "'" + command.out + "' is the creature's own " + name + ", which its report tells of",
+    throw UsageError(kReplayCommand, "option --out", "'" + command.out + "' is the creature's own " + name + ", which its report tells of",
                      "Leave --out out to have replay.glb and the report anew, or name another file.");
   }
 }
@@ -355,7 +355,7 @@ class CreatureReplay {
 
   /// The cheapest that keep the error asked for.
   void choose_steps() {
-    chosen_ = stages_.run("accuracy", [&] { return choose_step(command_.accuracy, kCommand, performer(), creature_.signals, std::nullopt); });
+    chosen_ = stages_.run("accuracy", [&] { return choose_step(command_.accuracy, kReplayCommand, performer(), creature_.signals, std::nullopt); });
     take_steps(options_.replay, chosen_->setting);
   }
 
@@ -451,7 +451,7 @@ class CreatureReplay {
 
 int replay(const ReplayCommand& command) {
   if (!command.out.empty() && fs::path(command.out).extension() != ".glb") {
-    throw UsageError(kCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
+    throw UsageError(kReplayCommand, "option --out", "'" + command.out + "' does not end with .glb", "The motion is written as binary glTF.");
   }
   if (!command.out.empty()) refuse_own_motion(command);
   return CreatureReplay(command, steps_per_row(command, {})).run();

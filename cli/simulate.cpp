@@ -29,8 +29,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kCommand = "hydrostat simulate";
-constexpr double kLongest = 3600;       // [s]
+constexpr const char* kSimulateCommand = "hydrostat simulate";
+constexpr double kLongestRun = 3600;       // [s]
 constexpr double kFirstMeasured = 2;    // [s] of the motion, on which most settings are tried where --max-error is asked for
 constexpr double kLargestTrace = 4e9;   // [bytes]
 
@@ -51,7 +51,7 @@ int steps_per_row(const SimulateCommand& command, double dt_s) {
     char text[120];
     std::snprintf(text, sizeof text, "%g Hz is not a whole part of the %g Hz at which the scene is stepped",
                   command.trace_rate, 1 / dt_s);
-    throw UsageError(kCommand, "option --trace-rate", text, "Give a whole part of it.");
+    throw UsageError(kSimulateCommand, "option --trace-rate", text, "Give a whole part of it.");
   }
   return static_cast<int>(std::lround(every));
 }
@@ -84,7 +84,7 @@ void refuse_large_trace(const SimulateCommand& command, const retarget::Simulati
   if (!options.trace) return;
   const double rows = options.duration_s / (options.dt_s * options.steps_per_row);
   if (rows * 8 * static_cast<double>(15 * nodes + edges) <= kLargestTrace) return;
-  throw UsageError(kCommand, "option --trace", "the trace would take more than 4 GB of memory",
+  throw UsageError(kSimulateCommand, "option --trace", "the trace would take more than 4 GB of memory",
                    command.trace_rate > 0 ? "Give a smaller --trace-rate or --duration." : "Give a --trace-rate.");
 }
 
@@ -94,7 +94,7 @@ ChosenStep choose(const SimulateCommand& command, io::SceneFile& scene) {
   options.duration_s = std::min(kFirstMeasured, scene.duration_s);
   return std::visit(
       [&]<int Dim>(const retarget::ScenarioOf<Dim>& scenario) {
-        ChosenStep chosen = choose_step(command.accuracy, kCommand, retarget::make_reference(scenario, options),
+        ChosenStep chosen = choose_step(command.accuracy, kSimulateCommand, retarget::make_reference(scenario, options),
                                         scene.method_is_auto ? std::nullopt : std::optional(scene.method), scene.duration_s);
         scene.method = chosen.setting.method;
         scene.dt_s = chosen.setting.dt_s;
@@ -213,7 +213,7 @@ int simulate(const SimulateCommand& command) {
       return (std::filesystem::weakly_canonical(std::filesystem::absolute(path)) / "").lexically_normal();
     };
     if (whole(command.trace) == whole(command.out)) {
-      throw UsageError(kCommand, "option --trace", "'" + command.trace + "' is where the outcome goes", "Name another folder, which may lie in it.");
+      throw UsageError(kSimulateCommand, "option --trace", "'" + command.trace + "' is where the outcome goes", "Name another folder, which may lie in it.");
     }
   }
   io::CreatureWriter writer(command.out, io::CreatureWriter::Start::afresh, io::CreatureWriter::Kind::simulation);
@@ -279,7 +279,7 @@ void add_simulate(CLI::App& app, int& exit_code) {
   sub->add_option("-o,--out", command->out, "Directory for motion, report and page; replaced as a whole")->check(refuse_no_place)->required();
   sub->add_option("--method", command->method, "Time integration [the scene's]")->check(CLI::IsMember(io::method_names()));
   sub->add_option("--duration", command->duration, "Seconds to simulate [the scene's]")
-      ->check(number_within(1e-3, kLongest));
+      ->check(number_within(1e-3, kLongestRun));
   add_accuracy_options(*sub, command->accuracy);
   CLI::Option* seed = sub->add_option("--seed", command->seed, "Of a random start [the scene's]");
   CLI::Option* trace =

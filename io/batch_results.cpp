@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kSchema = "hydrostat.batch/1";
+constexpr const char* kBatchSchema = "hydrostat.batch/1";
 
 std::string quoted(const std::string& text) {
   std::string result = "\"";
@@ -111,7 +111,7 @@ std::string batch_results_json(const std::vector<BatchResult>& results) {
                        {"warnings", result.warnings}});
   }
   const auto failed = std::count_if(results.begin(), results.end(), [](const BatchResult& r) { return r.exit_code != 0; });
-  const nlohmann::ordered_json root{{"schema", kSchema}, {"jobs", results.size()}, {"failed", failed}, {"results", entries}};
+  const nlohmann::ordered_json root{{"schema", kBatchSchema}, {"jobs", results.size()}, {"failed", failed}, {"results", entries}};
   // A log may hold bytes that are no UTF-8; they become U+FFFD.
   return root.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
@@ -121,7 +121,7 @@ std::vector<BatchResult> read_batch_results(const fs::path& file) {
   if (!fs::exists(file)) return results;
   try {
     const nlohmann::ordered_json root = nlohmann::ordered_json::parse(read_file(file));
-    if (root.at("schema") != kSchema) throw Error(file.string(), "schema", "is not " + std::string(kSchema), "");
+    if (root.at("schema") != kBatchSchema) throw Error(file.string(), "schema", "is not " + std::string(kBatchSchema), "");
     for (const nlohmann::ordered_json& entry : root.at("results")) results.push_back(result_of(entry));
   } catch (const std::exception&) {
     throw Error(file.string(), "", "is not a results file of hydrostat batch", "Remove it, or run without --resume.");

@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "hydrostat.body/1";
+constexpr const char* kBodySchema = "hydrostat.body/1";
 constexpr const char* kMend = "Make the creature again with 'hydrostat convert'.";
 
 /// A matrix as a list of its columns, a vector as a list.
@@ -32,9 +32,9 @@ Json list(const Eigen::MatrixBase<Derived>& values) {
   return columns;
 }
 
-class Reader {
+class BodyReader {
  public:
-  Reader(const Json& json, std::string file) : json_(json), file_(std::move(file)) {}
+  BodyReader(const Json& json, std::string file) : json_(json), file_(std::move(file)) {}
 
   [[noreturn]] void refuse(const std::string& place, const std::string& what) const { throw Error(file_, place, what, kMend); }
 
@@ -111,7 +111,7 @@ class Reader {
   std::string file_;
 };
 
-retarget::Embedding read_embedding(const Reader& reader, const Json& parent, Eigen::Index count, Eigen::Index nodes) {
+retarget::Embedding read_embedding(const BodyReader& reader, const Json& parent, Eigen::Index count, Eigen::Index nodes) {
   retarget::Embedding embedding;
   embedding.nodes = reader.columns<int, 4>(parent, "nodes");
   embedding.weights = reader.columns<double, 4>(parent, "weights");
@@ -122,7 +122,7 @@ retarget::Embedding read_embedding(const Reader& reader, const Json& parent, Eig
 }
 
 /// The edges 01 02 03 12 13 23 of each tet.
-Eigen::Matrix<int, 6, Eigen::Dynamic> edges_of_tets(const Reader& reader, const Eigen::Matrix4Xi& tets, const Eigen::Matrix2Xi& edges) {
+Eigen::Matrix<int, 6, Eigen::Dynamic> edges_of_tets(const BodyReader& reader, const Eigen::Matrix4Xi& tets, const Eigen::Matrix2Xi& edges) {
   std::map<std::pair<int, int>, int> place;
   for (int e = 0; e < edges.cols(); ++e) place[{edges(0, e), edges(1, e)}] = e;
   constexpr int kEnds[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
@@ -151,7 +151,7 @@ void put_elements(const physics::BodyElements<3>& elements, Json& json) {
   json["poissons_ratio"] = material.poissons_ratio;
 }
 
-physics::BodyElements<3> read_elements(const Reader& reader, const Json& json, const physics::Body& body) {
+physics::BodyElements<3> read_elements(const BodyReader& reader, const Json& json, const physics::Body& body) {
   physics::ElementMesh<3> mesh;
   mesh.rest = body.rest;
   const Json& all = reader.list_at(json, "elements");
@@ -178,7 +178,7 @@ physics::BodyElements<3> read_elements(const Reader& reader, const Json& json, c
 std::string body_text(const retarget::Performer& performer, const std::vector<std::string>& bones, const Eigen::VectorXi& node_bones) {
   const physics::Body& body = performer.scene.body;
   Json json;
-  json["schema"] = kSchema;
+  json["schema"] = kBodySchema;
   json["length_m"] = performer.length;
   json["size_m"] = performer.size;
   json["friction"] = performer.scene.ground.friction;
@@ -218,9 +218,9 @@ std::string body_text(const retarget::Performer& performer, const std::vector<st
 
 void parse_body(const std::string& text, const std::string& file, retarget::Performer& performer) {
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  const Reader reader(json, file);
+  const BodyReader reader(json, file);
   if (!json.is_object()) reader.refuse("", "is not JSON");
-  if (reader.at(json, "schema") != kSchema) reader.refuse("'schema'", "is not '" + std::string(kSchema) + "'");
+  if (reader.at(json, "schema") != kBodySchema) reader.refuse("'schema'", "is not '" + std::string(kBodySchema) + "'");
   physics::Body& body = performer.scene.body;
   performer.length = reader.number("length_m");
   performer.size = reader.number("size_m");

@@ -15,7 +15,7 @@ namespace hydrostat::io {
 
 namespace {
 
-constexpr const char* kSchema = "hydrostat.creature/1";
+constexpr const char* kRecordSchema = "hydrostat.creature/1";
 constexpr const char* kMend = "Make the creature again with 'hydrostat convert'.";
 
 std::string key_text(const std::string& key) {
@@ -86,7 +86,7 @@ const toml::table& table_of(const std::string& file, const toml::table& root, st
 std::string to_toml(const CreatureRecord& record) {
   std::ostringstream out;
   out << "# What this creature is made of. Written by hydrostat.\n";
-  put<std::string>(out, "schema", kSchema);
+  put<std::string>(out, "schema", kRecordSchema);
   out << "\n[source]\n";
   put(out, "file", record.source_file);
   put(out, "sha256", record.source_sha256);
@@ -112,8 +112,8 @@ CreatureRecord read_creature_record(const std::filesystem::path& creature) {
   try {
     const toml::table root = toml::parse(text, file);
     const std::string schema = text_of(file, root, "schema");
-    if (schema != kSchema) {
-      throw Error(file, where(root.get("schema")->source()), "schema is '" + schema + "', not '" + kSchema + "'", kMend);
+    if (schema != kRecordSchema) {
+      throw Error(file, where(root.get("schema")->source()), "schema is '" + schema + "', not '" + kRecordSchema + "'", kMend);
     }
     const toml::table& source = table_of(file, root, "source");
     CreatureRecord record{

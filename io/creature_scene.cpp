@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr const char* kSchema = "hydrostat.creature_scene/1";
+constexpr const char* kSceneSchema = "hydrostat.creature_scene/1";
 constexpr double kDeepest = 0.01;  // per L: what starts deeper in an obstacle is swallowed, what is less deep is lifted out
 constexpr double kFarCells = 4;    // along the body, as plan_self_contact has it
 const std::vector<std::string> kOfTheWorld{"schema", "gravity_m_s2", "ground", "obstacle", "push", "water", "air", "effects"};
@@ -37,7 +37,7 @@ void refuse_what_is_not_of_the_world(const TomlReader& root) {
   }
   for (const std::string& key : kOfTheWorld) root.has(key);
   root.refuse_others();
-  if (root.has("schema")) root.choice("schema", {kSchema});
+  if (root.has("schema")) root.choice("schema", {kSceneSchema});
   const std::optional<TomlReader> effects = root.table("effects");
   for (const std::string& key : kBodyEffects) {
     if (!effects || !effects->has(key)) continue;
@@ -209,7 +209,7 @@ std::string creature_scene_text(const std::filesystem::path& file) {
   read_wished_effects(root, world_effects(), 0);
   const std::vector<TomlReader> readers = root.tables("obstacle");
   for (std::size_t o = 0; o < readers.size(); ++o) write_out_mesh(readers[o], *table["obstacle"][o].as_table());
-  table.insert_or_assign("schema", kSchema);
+  table.insert_or_assign("schema", kSceneSchema);
   std::ostringstream text;
   text << "# The world that this creature is let go in. Written by hydrostat.\n" << table << "\n";
   return text.str();

@@ -9,9 +9,9 @@ namespace hydrostat::io {
 namespace {
 
 constexpr Eigen::Index kMostTurning = 4;
-constexpr Eigen::Index kSamples = 64;  // frames that the targets are fitted to
-constexpr double kEnough = 0.02;       // of the RMS offset
-constexpr double kUnseen = 1e-4;       // of the body's longest side, RMS
+constexpr Eigen::Index kMorphSamples = 64;  // frames that the targets are fitted to
+constexpr double kMorphsEnough = 0.02;      // of the RMS offset
+constexpr double kUnseen = 1e-4;            // of the body's longest side, RMS
 
 /// The vertices that some target moves, how the body turns at each, and where the targets take them.
 class MorphedSkin {
@@ -102,7 +102,7 @@ Eigen::Index sample(Eigen::Index s, Eigen::Index samples, Eigen::Index frames) {
 
 /// The mean turn at a vertex while targets are worn.
 std::vector<Eigen::Matrix3d> mean_turns(const MorphedSkin& skin) {
-  const Eigen::Index samples = std::min(skin.frames(), kSamples);
+  const Eigen::Index samples = std::min(skin.frames(), kMorphSamples);
   std::vector<Eigen::Matrix3d> means;
   for (Eigen::Index v = 0; v < skin.count(); ++v) {
     const Eigen::Vector4d first = skin.turn_at(v, 0).coeffs();
@@ -138,7 +138,7 @@ PlayedMorphs play_morphs(const retarget::MovingMorphs& morphs, const retarget::E
       left.col(v) = ((skin.turn_at(v, f).toRotationMatrix() - means[static_cast<std::size_t>(v)]) * left.col(v)).eval();
     return Eigen::VectorXd(left.reshaped());
   };
-  const Eigen::Index samples = std::min(skin.frames(), kSamples);
+  const Eigen::Index samples = std::min(skin.frames(), kMorphSamples);
   Eigen::MatrixXd left(3 * skin.count(), samples);
   double worn = 0;
   for (Eigen::Index s = 0; s < samples; ++s) {
@@ -146,7 +146,7 @@ PlayedMorphs play_morphs(const retarget::MovingMorphs& morphs, const retarget::E
     worn += skin.worn(sample(s, samples, skin.frames())).squaredNorm();
   }
   const double unseen = kUnseen * (body.nodes.rowwise().maxCoeff() - body.nodes.rowwise().minCoeff()).maxCoeff();
-  const double enough = std::max(kEnough * kEnough * worn, unseen * unseen * static_cast<double>(samples * skin.count()));
+  const double enough = std::max(kMorphsEnough * kMorphsEnough * worn, unseen * unseen * static_cast<double>(samples * skin.count()));
   const Eigen::MatrixXd directions = principal_directions(left, enough, kMostTurning);
   played.weights.resize(skin.weights().rows() + directions.cols(), skin.frames());
   played.weights.topRows(skin.weights().rows()) = skin.weights();

@@ -9,8 +9,8 @@ namespace hydrostat::io {
 namespace {
 
 constexpr Eigen::Index kMostTargets = 8;  // that every reader of glTF is asked to know
-constexpr Eigen::Index kSamples = 64;     // frames that the targets are fitted to
-constexpr double kEnough = 0.035;         // [rad] RMS
+constexpr Eigen::Index kNormalSamples = 64;  // frames that the targets are fitted to
+constexpr double kNormalsEnough = 0.035;     // [rad] RMS
 
 }  // namespace
 
@@ -31,10 +31,10 @@ MovingNormals fit_normals(const std::vector<Appearance::Part>& parts, const Skin
     if (!shapes.empty()) offsets -= of_shapes * shape_weights.col(f);
     return offsets;
   };
-  const Eigen::Index frames = skin.frames, samples = std::min(frames, kSamples);
+  const Eigen::Index frames = skin.frames, samples = std::min(frames, kNormalSamples);
   Eigen::MatrixXd sampled(3 * normals.count(), samples);
   for (Eigen::Index s = 0; s < samples; ++s) sampled.col(s) = offsets_at(samples > 1 ? s * (frames - 1) / (samples - 1) : 0);
-  const double enough = kEnough * kEnough * static_cast<double>(samples * normals.count());
+  const double enough = kNormalsEnough * kNormalsEnough * static_cast<double>(samples * normals.count());
   const Eigen::MatrixXd directions = principal_directions(sampled, enough, kMostTargets);
   if (directions.cols() == 0) return result;
   result.weights.resize(directions.cols(), frames);

@@ -12,7 +12,7 @@ namespace {
 constexpr std::uint64_t kMagic = 0x344e4353'4f524459;  // begins an answer; another for each form of it
 constexpr std::uint64_t kEnd = 0x2e646e65'2e646e65;    // ends it
 constexpr double kLargestNumber = 1e12;
-constexpr std::size_t kMostNodes = 10000, kMostClips = 2000;  // what follows takes time that grows faster than they do
+constexpr std::size_t kMostSceneNodes = 10000, kMostClips = 2000;  // what follows takes time that grows faster than they do
 
 class Writer {
  public:
@@ -283,7 +283,7 @@ void check_material(const Material& material, std::size_t images) {
 /// Throws std::runtime_error where an index points nowhere or sizes disagree.
 void check(const Scene& scene) {
   require(scene.metres_per_unit > 0, "the unit is not positive");
-  require(scene.nodes.size() <= kMostNodes, "it has more than 10,000 nodes");
+  require(scene.nodes.size() <= kMostSceneNodes, "it has more than 10,000 nodes");
   require(scene.clips.size() <= kMostClips, "it has more than 2,000 clips");
   for (std::size_t n = 0; n < scene.nodes.size(); ++n) {
     const SceneNode& node = scene.nodes[n];

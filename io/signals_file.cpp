@@ -20,7 +20,7 @@ using retarget::SignalSet;
 using signal::Kind;
 using signal::Spectrum;
 
-constexpr const char* kSchema = "hydrostat.signals/1";
+constexpr const char* kSignalsSchema = "hydrostat.signals/1";
 constexpr const char* kListSchema = "hydrostat.signals_list/1";
 constexpr int kMostSamples = 100'000;  // minutes at any control rate: more is a slip of the pen
 constexpr const char* kDropLayers = "'hydrostat signals DIR reset' drops layers";
@@ -245,9 +245,9 @@ Json parsed_json(const std::string& text, const std::string& file) {
 void check_schema(const Place& root) {
   const Place schema = root.at("schema");
   const std::string name = schema.text();
-  if (name != kSchema) {
+  if (name != kSignalsSchema) {
     schema.refuse("'" + name + "' is not known here",
-                  std::string("This version reads '") + kSchema + "'; convert the clip again.");
+                  std::string("This version reads '") + kSignalsSchema + "'; convert the clip again.");
   }
 }
 
@@ -393,7 +393,7 @@ SignalSet read_solved(const Place& root) {
 
 std::string signals_text(const SignalSet& set) {
   Json json;
-  json["schema"] = kSchema;
+  json["schema"] = kSignalsSchema;
   json["kind"] = kind_name(set.kind());
   json["period_s"] = set.period_s;
   json["samples"] = set.samples();

@@ -20,10 +20,10 @@ static_assert(std::endian::native == std::endian::little, "stage-cache entries a
 
 namespace {
 
-constexpr std::string_view kMagic = "hydrostat.cache/1\n";
+constexpr std::string_view kStageMagic = "hydrostat.cache/1\n";
 constexpr std::size_t kChecksumSize = 64;
 
-class Writer {
+class RecordWriter {
  public:
   template <typename Number>
   requires std::is_arithmetic_v<Number>
@@ -50,10 +50,10 @@ class Writer {
   std::string bytes;
 };
 
-/// Reads what Writer wrote. The checksum has vouched for the bytes, yet no size is trusted beyond what is left of them.
-class Reader {
+/// Reads what RecordWriter wrote. The checksum has vouched for the bytes, yet no size is trusted beyond what is left of them.
+class RecordReader {
  public:
-  explicit Reader(std::string_view bytes) : left_(bytes) {}
+  explicit RecordReader(std::string_view bytes) : left_(bytes) {}
 
   bool sound_and_at_end() const { return sound_ && left_.empty(); }
 
@@ -116,8 +116,8 @@ bool is_entry_of(const std::string& stage, const std::string& file) {
 }  // namespace
 
 std::string packed(const Record& record, const std::string& stage, const std::string& key) {
-  Writer writer;
-  writer.bytes = kMagic;
+  RecordWriter writer;
+  writer.bytes = kStageMagic;
   writer.put(std::string_view(stage));
   writer.put(std::string_view(key));
   writer.put(record.matrices);
@@ -129,11 +129,11 @@ std::string packed(const Record& record, const std::string& stage, const std::st
 }
 
 std::optional<Record> unpacked(const std::string& bytes, const std::string& stage, const std::string& key) {
-  if (bytes.size() < kMagic.size() + kChecksumSize || !bytes.starts_with(kMagic)) return std::nullopt;
+  if (bytes.size() < kStageMagic.size() + kChecksumSize || !bytes.starts_with(kStageMagic)) return std::nullopt;
   const std::string_view body = std::string_view(bytes).substr(0, bytes.size() - kChecksumSize);
   if (sha256(body) != std::string_view(bytes).substr(body.size())) return std::nullopt;
 
-  Reader reader(body.substr(kMagic.size()));
+  RecordReader reader(body.substr(kStageMagic.size()));
   std::string stored_stage, stored_key;
   Record record;
   reader.get(stored_stage);

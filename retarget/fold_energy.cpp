@@ -9,9 +9,9 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kApart = 3;     // widths [-] between the middles of parts that do not meet yet
-constexpr double kSwing = 2;     // of L [m]: how far the middle of a clamped body sinks, at most
-constexpr double kTouch = 1e-6;   // of L [m]: how deep a body may start in what it touches
+constexpr double kPartsApart = 3;  // widths [-] between the middles of parts that do not meet yet
+constexpr double kSwing = 2;       // of L [m]: how far the middle of a clamped body sinks, at most
+constexpr double kTouch = 1e-6;    // of L [m]: how deep a body may start in what it touches
 constexpr double kForEver = 1e299;  // [s]: a clamp that lets go then never does
 
 template <int Dim>
@@ -68,7 +68,7 @@ double energies_to_fold(const ScenarioOf<Dim>& scenario, const Bar& bar, double 
   const double section = scenario.scene.body.rest_volume.sum() / bar.length;
   double needed = std::numeric_limits<double>::infinity();
   for (const double width : {bar.thickness, bar.breadth}) {
-    const double turn = 2 * std::acos(std::min(1.0, kApart * width / bar.length));
+    const double turn = 2 * std::acos(std::min(1.0, kPartsApart * width / bar.length));
     needed = std::min(needed, bar.softest * section * width * width / 12 * turn * turn / (2 * bar.length));
   }
   const double given = energy_given(scenario, duration_s);

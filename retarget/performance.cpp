@@ -4,6 +4,7 @@
 #include <cmath>
 #include <future>
 #include <memory>
+#include <numeric>
 #include <random>
 
 #include "physics/element_body.h"
@@ -99,18 +100,32 @@ bool is_lost(const Performer& performer, const PerformOptions& options, const Re
   return is_as_planned(performer, options.replay) && run.report.drift_per_cycle_length > kOffPlace;
 }
 
-/// The `first` of kTrials and the next, side by side.
-std::array<Replay, 2> run_pair(std::size_t first, const Act& act, const PerformOptions& options) {
+/// Which of kTrials are lost.
+using Lost = std::array<bool, kTrials.size()>;
+
+int count(const Lost& lost) { return static_cast<int>(std::count(lost.begin(), lost.end(), true)); }
+
+/// Two of kTrials, side by side.
+std::array<Replay, 2> run_pair(const std::array<std::size_t, 2>& which, const Act& act, const PerformOptions& options) {
   const auto go = [&](std::size_t k) { return run_trial(kTrials[k], act, options); };
-  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, first);
-  Replay second = go(first + 1);
+  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, which[0]);
+  Replay second = go(which[1]);
   return {beside.get(), std::move(second)};
 }
 
-/// How many of these are lost.
-int pair_lost(std::size_t first, const Act& act, const PerformOptions& options) {
-  const std::array<Replay, 2> runs = run_pair(first, act, options);
-  return static_cast<int>(std::count_if(runs.begin(), runs.end(), [&](const Replay& run) { return is_lost(act.performer(), options, run); }));
+void find_lost(const std::array<std::size_t, 2>& which, const Act& act, const PerformOptions& options, Lost& lost) {
+  const std::array<Replay, 2> runs = run_pair(which, act, options);
+  for (std::size_t k = 0; k < runs.size(); ++k) lost[which[k]] = is_lost(act.performer(), options, runs[k]);
+}
+
+/// Which of kTrials are lost, those first that were lost before; the rest are left out once so many are that it is no better.
+Lost lost_on_trials(const Act& act, const PerformOptions& options, const Lost& before, int no_better) {
+  std::array<std::size_t, kTrials.size()> order;
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_partition(order.begin(), order.end(), [&](std::size_t k) { return before[k]; });
+  Lost lost{};
+  for (std::size_t k = 0; k < order.size() && count(lost) < no_better; k += 2) find_lost({order[k], order[k + 1]}, act, options, lost);
+  return lost;
 }
 
 /// Where the planned body keeps its way and heavy ones, which of our clips are lost first, do not: the regulator on which fewest of
@@ -119,22 +134,22 @@ void keep_more_bodies(const Act& act, const PerformOptions& options, Performance
   PerformOptions on_trial = options, other = options;
   on_trial.replay.duration_s = std::min(options.replay.duration_s, kLookSeconds);
   other.baselines = false;
-  result.trials_lost = pair_lost(0, act, on_trial);
-  if (result.trials_lost > 0) result.trials_lost += pair_lost(2, act, on_trial);
+  Lost least{};
+  find_lost({0, 1}, act, on_trial, least);
+  if (count(least) > 0) find_lost({2, 3}, act, on_trial, least);
   for (const Feedback& feedback : kOthers) {
     if (feedback.regulator == 0 || feedback == options.feedback) continue;  // others are for feet that the usual gain shakes loose
+    if (count(least) == 0) break;
     on_trial.feedback = other.feedback = feedback;
-    int lost = 0;
-    for (std::size_t first = 0; first < kTrials.size() && lost < result.trials_lost; first += 2) {
-      lost += pair_lost(first, act, on_trial);
-    }
-    if (lost >= result.trials_lost) continue;
+    const Lost lost = lost_on_trials(act, on_trial, least, count(least));
+    if (count(lost) >= count(least)) continue;
     Performances next = perform(act, other);
     if (straying(act.performer(), options.replay, next.main()) > 1) continue;
-    result.trials_lost = lost;
+    least = lost;
     result.closed_loop = std::move(next.closed_loop);
     result.feedback = feedback;
   }
+  result.trials_lost = count(least);
 }
 
 }  // namespace
@@ -243,7 +258,7 @@ TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options) {
   static_assert(kTrials.size() % 2 == 0, "they go in pairs");
   TrialsOutcome result;
   for (std::size_t first = 0; first < kTrials.size(); first += 2) {
-    for (const Replay& run : run_pair(first, act, options)) {
+    for (const Replay& run : run_pair({first, first + 1}, act, options)) {
       if (is_lost(act.performer(), options, run)) ++result.lost;
       result.shape_rms_length += run.report.shape_rms_length / static_cast<double>(kTrials.size());
     }
@@ -267,21 +282,24 @@ Performances perform_steadily(const Act& act, const PerformOptions& options) {
   }
   PerformOptions other = options;
   other.baselines = false;
+  Lost least_lost{};
   for (const Feedback& feedback : kOthers) {
     const bool is_well = least <= 1;
-    if (is_well && result.trials_lost == 0) break;
+    if (is_well && count(least_lost) == 0) break;
     if (feedback == options.feedback || (feedback.regulator > 0 && !options.is_thorough)) continue;
     other.feedback = feedback;
     Performances next = perform(act, other);
     const double its = straying(performer, options.replay, next.main());
     if (its > 1 && (is_well || its >= kBetter * least)) continue;
-    const int lost = its <= 1 && options.is_thorough ? go_on_trials(act, other).lost : 0;
-    if (is_well && lost >= result.trials_lost) continue;
+    const int no_better = is_well ? count(least_lost) : static_cast<int>(kTrials.size()) + 1;
+    const Lost lost = its <= 1 && options.is_thorough ? lost_on_trials(act, other, least_lost, no_better) : Lost{};
+    if (is_well && count(lost) >= count(least_lost)) continue;
     least = its;
-    result.trials_lost = lost;
+    least_lost = lost;
     result.closed_loop = std::move(next.closed_loop);
     result.feedback = feedback;
   }
+  result.trials_lost = count(least_lost);
   result.lapse = lapse_of(least);
   return result;
 }

@@ -9,7 +9,7 @@ namespace {
 constexpr double kMostSubsteps = 2000;  // as make_explicit_stepper has it
 constexpr double kSpare = 0.7;          // of the damping time that would just do at rest: bodies stiffen when they deform
 constexpr double kStride = 1.5, kExactness = 1.05;  // between shares that are tried, and of the one that is found
-constexpr double kLeastShare = 1e-6;
+constexpr double kLeastFound = 1e-6;
 
 template <int Dim>
 double substep_with(physics::SceneOf<Dim> scene, double damping_share, double dt) {
@@ -25,7 +25,7 @@ double largest_share(const physics::SceneOf<Dim>& scene, double wanted, double d
   while (substep_with<Dim>(scene, low, dt) < wanted) {
     high = low;
     low /= kStride;
-    if (low < kLeastShare) return 0;
+    if (low < kLeastFound) return 0;
   }
   while (high > kExactness * low) {
     const double middle = std::sqrt(low * high);

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kSpeedCommand = "hydrostat bench speed";
-constexpr int kTimes = 5;  // of reading
+constexpr int kReadings = 5;  // of reading
 constexpr const char* kSmallClip =
     "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\nJOINT b\n{\nOFFSET 0 1 0\n"
     "CHANNELS 3 Xrotation Yrotation Zrotation\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n}\n"
@@ -97,7 +97,7 @@ std::vector<int> wished_nodes(const std::string& list) {
 /// Processor time [ms] that the reading process takes for a file, the best of several.
 double reading_ms(const std::string& file, const io::ReadLimits& limits) {
   double least = 0;
-  for (int i = 0; i < kTimes; ++i) {
+  for (int i = 0; i < kReadings; ++i) {
     io::ReadCost cost;
     io::read_in_worker(file, limits, &cost);
     if (i == 0 || cost.cpu_s < least) least = cost.cpu_s;

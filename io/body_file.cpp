@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kBodySchema = "hydrostat.body/1";
-constexpr const char* kMend = "Make the creature again with 'hydrostat convert'.";
+constexpr const char* kMendBody = "Make the creature again with 'hydrostat convert'.";
 
 /// A matrix as a list of its columns, a vector as a list.
 template <typename Derived>
@@ -36,7 +36,7 @@ class BodyReader {
  public:
   BodyReader(const Json& json, std::string file) : json_(json), file_(std::move(file)) {}
 
-  [[noreturn]] void refuse(const std::string& place, const std::string& what) const { throw Error(file_, place, what, kMend); }
+  [[noreturn]] void refuse(const std::string& place, const std::string& what) const { throw Error(file_, place, what, kMendBody); }
 
   const Json& at(const Json& parent, const std::string& key) const {
     const auto found = parent.is_object() ? parent.find(key) : parent.end();

@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, 21> kOwnFiles{
     "creature.toml",  "scene.toml", "body.json",  "target.bin",  "path.bin",     "rig.bin",     "appearance.bin", "morphs.bin", "wobble.bin",
     "signals.json", "reference.glb", "replay.glb", "failed.glb", "report.json", "report.html", "accuracy.csv", "accuracy.svg",
     "replay.pc2", "replay.mdd", "replay.obj", "replay.mtl"};
-constexpr const char* kFrames = "replay_obj";  // a directory, in which only frames are ours
+constexpr const char* kFramesFolder = "replay_obj";  // a directory, in which only frames are ours
 constexpr const char* kFrameName = "replay";
 
 Error directory_error(const fs::path& shown_as, int error_number) {
@@ -163,7 +163,7 @@ void CreatureWriter::carry_over(bool everything) {
     for (const fs::directory_entry& entry : fs::directory_iterator(creature_)) {
       const fs::path name = entry.path().filename();
       const bool own = std::find(kOwnFiles.begin(), kOwnFiles.end(), name.string()) != kOwnFiles.end();
-      if (!everything && name == kFrames) {
+      if (!everything && name == kFramesFolder) {
         keep_others_than_obj_frames(entry.path(), kFrameName, part_ / name);
       } else if (everything || !own) {
         link_or_copy(entry.path(), part_ / name);
@@ -188,7 +188,7 @@ Error CreatureWriter::as_seen(const Error& error) const {
 
 void CreatureWriter::remove(const std::string& name) {
   try {
-    if (name == kFrames) {
+    if (name == kFramesFolder) {
       remove_obj_frames(part_ / name, kFrameName);
     } else {
       fs::remove_all(part_ / name);

@@ -16,7 +16,7 @@ namespace hydrostat::io {
 namespace {
 
 constexpr const char* kRecordSchema = "hydrostat.creature/1";
-constexpr const char* kMend = "Make the creature again with 'hydrostat convert'.";
+constexpr const char* kMendRecord = "Make the creature again with 'hydrostat convert'.";
 
 std::string key_text(const std::string& key) {
   const bool bare = !key.empty() && std::all_of(key.begin(), key.end(), [](unsigned char letter) {
@@ -54,7 +54,7 @@ std::string where(const toml::source_region& source) { return "line " + std::to_
 std::string text_of(const std::string& file, const toml::table& table, std::string_view key) {
   const toml::node* node = table.get(key);
   if (node == nullptr || !node->is_string()) {
-    throw Error(file, where(table.source()), "a text '" + std::string(key) + "' is missing", kMend);
+    throw Error(file, where(table.source()), "a text '" + std::string(key) + "' is missing", kMendRecord);
   }
   return **node->as_string();
 }
@@ -62,7 +62,7 @@ std::string text_of(const std::string& file, const toml::table& table, std::stri
 double number_of(const std::string& file, const toml::table& table, std::string_view key) {
   const toml::node* node = table.get(key);
   if (node == nullptr || !node->is_number()) {
-    throw Error(file, where(table.source()), "a number '" + std::string(key) + "' is missing", kMend);
+    throw Error(file, where(table.source()), "a number '" + std::string(key) + "' is missing", kMendRecord);
   }
   return *node->value<double>();
 }
@@ -72,12 +72,12 @@ CreatureRecord::Setting setting_of(const std::string& file, const std::string& k
   if (const auto* number = node.as_integer()) return **number;
   if (const auto* number = node.as_floating_point()) return **number;
   if (const auto* text = node.as_string()) return **text;
-  throw Error(file, where(node.source()), "setting '" + key + "' is neither number, text nor true or false", kMend);
+  throw Error(file, where(node.source()), "setting '" + key + "' is neither number, text nor true or false", kMendRecord);
 }
 
 const toml::table& table_of(const std::string& file, const toml::table& root, std::string_view key) {
   const toml::table* table = root[key].as_table();
-  if (table == nullptr) throw Error(file, where(root.source()), "the table [" + std::string(key) + "] is missing", kMend);
+  if (table == nullptr) throw Error(file, where(root.source()), "the table [" + std::string(key) + "] is missing", kMendRecord);
   return *table;
 }
 
@@ -113,7 +113,7 @@ CreatureRecord read_creature_record(const std::filesystem::path& creature) {
     const toml::table root = toml::parse(text, file);
     const std::string schema = text_of(file, root, "schema");
     if (schema != kRecordSchema) {
-      throw Error(file, where(root.get("schema")->source()), "schema is '" + schema + "', not '" + kRecordSchema + "'", kMend);
+      throw Error(file, where(root.get("schema")->source()), "schema is '" + schema + "', not '" + kRecordSchema + "'", kMendRecord);
     }
     const toml::table& source = table_of(file, root, "source");
     CreatureRecord record{
@@ -129,14 +129,14 @@ CreatureRecord read_creature_record(const std::filesystem::path& creature) {
     if (const toml::array* effects = root["effect"].as_array()) {
       for (const toml::node& node : *effects) {
         const toml::table* effect = node.as_table();
-        if (effect == nullptr) throw Error(file, where(node.source()), "an effect is not a table", kMend);
+        if (effect == nullptr) throw Error(file, where(node.source()), "an effect is not a table", kMendRecord);
         record.effects.push_back(
             {text_of(file, *effect, "name"), text_of(file, *effect, "state"), text_of(file, *effect, "reason")});
       }
     }
     return record;
   } catch (const toml::parse_error& error) {
-    throw Error(file, where(error.source()), std::string(error.description()), kMend);
+    throw Error(file, where(error.source()), std::string(error.description()), kMendRecord);
   }
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "NumPy files are written as memory holds them");
 
-constexpr std::string_view kMagic{"\x93NUMPY\x01\x00", 8};
+constexpr std::string_view kNpyMagic{"\x93NUMPY\x01\x00", 8};
 constexpr std::size_t kPreamble = 10;  // magic, version and the two bytes of the header's length
 constexpr std::size_t kAlignment = 64;
 
@@ -38,7 +38,7 @@ void write(const std::filesystem::path& path, const std::vector<std::size_t>& sh
   header += "), }";
   header.append(kAlignment - 1 - (kPreamble + header.size()) % kAlignment, ' ');
   header += '\n';
-  std::string bytes(kMagic);
+  std::string bytes(kNpyMagic);
   bytes += static_cast<char>(header.size() & 0xff);
   bytes += static_cast<char>(header.size() >> 8);
   bytes += header;
@@ -70,7 +70,7 @@ NpyArray<Number> read(const std::filesystem::path& path) {
     return Error(path.string(), "header", what, "Give a file that hydrostat's --trace wrote");
   };
   const std::string bytes = read_file(path);
-  if (bytes.size() < kPreamble || bytes.compare(0, kMagic.size(), kMagic) != 0)
+  if (bytes.size() < kPreamble || bytes.compare(0, kNpyMagic.size(), kNpyMagic) != 0)
     throw refuse("not a NumPy file of format 1.0");
   const std::size_t header_size = static_cast<unsigned char>(bytes[8]) + 256u * static_cast<unsigned char>(bytes[9]);
   if (bytes.size() < kPreamble + header_size) throw refuse("the file ends inside its header");

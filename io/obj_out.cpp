@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kLeastDigits = 4;  // of a frame's number
 
-void put(std::string& text, float number) {
+void put_number(std::string& text, float number) {
   std::array<char, 32> digits;
   text.append(digits.data(), std::to_chars(digits.begin(), digits.end(), number).ptr);
 }
@@ -29,7 +29,7 @@ void put_line(std::string& text, const char* key, const Numbers& numbers) {
   text += key;
   for (const double number : numbers) {
     text += ' ';
-    put(text, static_cast<float>(number));
+    put_number(text, static_cast<float>(number));
   }
   text += '\n';
 }

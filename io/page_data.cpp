@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kMend = "Make it again with 'hydrostat replay' ('simulate' for a scene).";
+constexpr const char* kMendPage = "Make it again with 'hydrostat replay' ('simulate' for a scene).";
 
 /// Numbers as packed_as() wrote them, `rows` of each column; at least one column.
 template <typename Number, typename Derived>
@@ -86,7 +86,7 @@ std::filesystem::path report_page_of(const std::filesystem::path& subject) {
                 "Make one with 'hydrostat convert' or 'hydrostat simulate'.");
   }
   const std::filesystem::path page = subject / "report.html";
-  if (!std::filesystem::is_regular_file(page)) throw Error(page.string(), "", "is missing", kMend);
+  if (!std::filesystem::is_regular_file(page)) throw Error(page.string(), "", "is missing", kMendPage);
   return page;
 }
 
@@ -94,7 +94,7 @@ PageData read_page(const std::filesystem::path& file) {
   const std::string opening = "<script type=\"application/json\" id=\"data\">";
   const std::string text = read_file(file);
   const std::size_t begin = text.find(opening), end = begin == std::string::npos ? begin : text.find("</script>", begin);
-  if (end == std::string::npos) throw Error(file.string(), "", "is no report page", kMend);
+  if (end == std::string::npos) throw Error(file.string(), "", "is no report page", kMendPage);
   PageData page;
   page.file = file;
   bool is_whole = false;
@@ -105,7 +105,7 @@ PageData read_page(const std::filesystem::path& file) {
   } catch (const Json::exception&) {
     is_whole = false;
   }
-  if (!is_whole) throw Error(file.string(), "", "is damaged or of another version", kMend);
+  if (!is_whole) throw Error(file.string(), "", "is damaged or of another version", kMendPage);
   return page;
 }
 

@@ -7,8 +7,8 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr const char* kTitle = "hydrostat.path";
-constexpr const char* kVersion = "1";
+constexpr const char* kPathTitle = "hydrostat.path";
+constexpr const char* kPathVersion = "1";
 
 void name_motion(RecordArchive& archive, const std::string& name, retarget::Motion& motion) {
   archive.exchange(name + "/rate_hz", motion.rate_hz);
@@ -68,11 +68,11 @@ retarget::Polished result_of(const Record& record) {
 }
 
 std::string path_bytes(const PerformedTarget& target) {
-  return packed(record_by(name_told_path, ToldPath{target.performer.path, *target.report.polish}), kTitle, kVersion);
+  return packed(record_by(name_told_path, ToldPath{target.performer.path, *target.report.polish}), kPathTitle, kPathVersion);
 }
 
 void parse_path(const std::string& bytes, const std::string& file, PerformedTarget& target) {
-  ToldPath told = read_packed(bytes, file, kTitle, kVersion,
+  ToldPath told = read_packed(bytes, file, kPathTitle, kPathVersion,
                               [](const Record& record) { return value_by<ToldPath>(name_told_path, record); });
   const retarget::Motion& motion = target.performer.prepared.target;
   if (!is_sound(told.path.place, motion) || !is_sound(told.path.velocity, motion)) throw not_of("target.bin", file);

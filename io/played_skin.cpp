@@ -9,7 +9,7 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr double kOnFrame = 1e-6;  // of the time between two frames
+constexpr double kAtFrame = 1e-6;  // of the time between two frames
 
 /// Normals of the vertices, 3 x V: the mean of the triangles around, weighted by area; up where a vertex has none.
 Eigen::Matrix3Xd vertex_normals(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix3Xi& triangles) {
@@ -87,11 +87,11 @@ Eigen::Matrix3Xd PlayedSkin::carried(const Eigen::Ref<const Eigen::Matrix3Xd>& n
 
 PlayedSkin::Pose PlayedSkin::at(double time_s) const {
   const double frame = std::clamp(time_s * motion_.rate_hz, 0.0, static_cast<double>(motion_.count() - 1));
-  const auto before = static_cast<Eigen::Index>(frame + kOnFrame);
+  const auto before = static_cast<Eigen::Index>(frame + kAtFrame);
   const double share = frame - static_cast<double>(before);
   Pose pose;
   pose.turn = turns_[static_cast<std::size_t>(before)];
-  if (share <= kOnFrame) {
+  if (share <= kAtFrame) {
     pose.vertices = carried_at(before);
   } else {
     const Eigen::Index after = before + 1;

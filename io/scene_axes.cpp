@@ -11,7 +11,7 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr int kFrames = 24;
+constexpr int kFramesLookedAt = 24;
 constexpr double kSurer = 0.5;  // how much better the floor along z must be than along y
 constexpr double kPerson = 1.7, kShortPerson = 1.4, kTallPerson = 2.0, kSmallest = 0.3, kLargest = 3;  // [m]
 constexpr std::array<std::pair<double, const char*>, 4> kUnits{{{0.01, "centimetres"},
@@ -41,8 +41,8 @@ std::vector<Eigen::Matrix3Xd> joints_over_time(const Scene& scene) {
   std::vector<Eigen::Matrix3Xd> frames;
   const SceneClip* clip = scene.clips.empty() ? nullptr : &scene.clips.front();
   const ClipRange range = clip ? range_of(*clip) : ClipRange{};
-  for (int f = 0; f <= kFrames; ++f) {
-    const std::vector<Eigen::Affine3d> poses = node_poses(scene, clip, range.start_s + range.length_s() * f / kFrames);
+  for (int f = 0; f <= kFramesLookedAt; ++f) {
+    const std::vector<Eigen::Affine3d> poses = node_poses(scene, clip, range.start_s + range.length_s() * f / kFramesLookedAt);
     Eigen::Matrix3Xd joints(3, static_cast<Eigen::Index>(poses.size()));
     for (std::size_t n = 0; n < poses.size(); ++n) joints.col(static_cast<Eigen::Index>(n)) = poses[n].translation();
     frames.push_back(std::move(joints));

@@ -11,7 +11,7 @@ using physics::VectorOf;
 using retarget::ScenarioOf;
 
 constexpr double kSteepest = 80;    // [deg] of the ground
-constexpr double kFriction = 0.8;
+constexpr double kSurfaceFriction = 0.8;
 constexpr double kAirDensity = 1.2;  // [kg/m3]
 constexpr Within kFrictionRange{.least = 0, .most = 10};
 const std::vector<std::string> kWishes{"auto", "on", "off"};
@@ -33,7 +33,7 @@ physics::GroundOf<Dim> read_ground(const TomlReader& table, const VectorOf<Dim>&
   physics::GroundOf<Dim> ground;
   ground.normal = std::cos(slope) * VectorOf<Dim>::UnitY() - std::sin(slope) * way_up<Dim>(table);
   ground.offset = table.number_or("height_m", 0, kPlace) * ground.normal[1] - ground.normal.dot(origin);
-  ground.friction = table.number_or("friction", kFriction, kFrictionRange);
+  ground.friction = table.number_or("friction", kSurfaceFriction, kFrictionRange);
   table.refuse_others();
   return ground;
 }
@@ -63,7 +63,7 @@ physics::ObstacleOf<Dim> read_obstacle(const TomlReader& table, const VectorOf<D
   }
   obstacle.place = table.numbers_or("position_m", VectorOf<Dim>::Zero(), kPlace) - origin;
   obstacle.turn = rotation_of<Dim>(table);
-  obstacle.friction = table.number_or("friction", kFriction, kFrictionRange);
+  obstacle.friction = table.number_or("friction", kSurfaceFriction, kFrictionRange);
   return obstacle;
 }
 

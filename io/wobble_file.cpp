@@ -5,8 +5,8 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr const char* kTitle = "hydrostat.wobble";
-constexpr const char* kVersion = "1";
+constexpr const char* kWobbleTitle = "hydrostat.wobble";
+constexpr const char* kWobbleVersion = "1";
 
 void name_fields(RecordArchive& archive, retarget::Wobble& wobble) {
   archive.fields("shapes", wobble.shapes, "frequency_hz", wobble.frequency_hz, "drive", wobble.drive, "mean_load", wobble.mean_load,
@@ -34,10 +34,10 @@ retarget::Wobble result_of(const Record& record) {
   return value_by<retarget::Wobble>(name_fields, record);
 }
 
-std::string wobble_bytes(const retarget::Wobble& wobble) { return packed(record_of(wobble), kTitle, kVersion); }
+std::string wobble_bytes(const retarget::Wobble& wobble) { return packed(record_of(wobble), kWobbleTitle, kWobbleVersion); }
 
 retarget::Wobble parse_wobble(const std::string& bytes, const std::string& file, const retarget::Performer& performer) {
-  retarget::Wobble wobble = read_packed(bytes, file, kTitle, kVersion, result_of<retarget::Wobble>);
+  retarget::Wobble wobble = read_packed(bytes, file, kWobbleTitle, kWobbleVersion, result_of<retarget::Wobble>);
   if (!is_sound(wobble, performer)) throw not_of("body.json", file);
   return wobble;
 }

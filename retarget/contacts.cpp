@@ -6,10 +6,11 @@
 #include <map>
 #include <utility>
 
+#include "retarget/gravity.h"
+
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kGravity = 9.81;
 constexpr double kQuick = 3;  // times the speed of what stands: a patch that must bear holds up to here
 
 /// Runs of equal labels shorter than `least` take the label before them (round the seam of a loop too), shortest first.

@@ -58,6 +58,8 @@ ContactSchedule label_contacts(const Motion& points, const std::vector<int>& bon
 /// of the lowest point.
 double ground_height(const Motion& points);
 
+inline constexpr double kTouching = 0.003;  // per D: points of a contact that ended higher bear no load
+
 /// Marks as touching the points of patches in contact that lie lower than `height` [m] in `points`, at least the lowest.
 void mark_touching(const Motion& points, double height, ContactSchedule& schedule);
 

@@ -26,6 +26,7 @@ struct CorrectorOptions {
   double long_step = 0.15;      // of h: what is longer is stepped at once, whatever the plan; infinite: never
   int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
   RegulatorOptions regulator;   // that takes the place of all that but the cones, within its reach
+  bool operator==(const CorrectorOptions&) const = default;
 };
 
 /// What contact does when muscles are corrected, and what it is to do.

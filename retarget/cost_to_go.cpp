@@ -15,7 +15,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kForgotten = 1;      // [s] ahead, from which on the end of a recursion does not matter
-constexpr long kSamples = 12;         // moments that modes are found in
+constexpr long kMoments = 12;         // moments that modes are found in
 constexpr long kMostMatrices = 400;   // that are kept
 constexpr double kEndWeight = 10;     // of a deviation at the end, over that of a step
 
@@ -61,7 +61,7 @@ class Moments {
   }
   std::vector<PlannedMoment> some() {
     std::vector<PlannedMoment> moments;
-    const long count = std::min(kSamples, steps_);
+    const long count = std::min(kMoments, steps_);
     Eigen::Matrix3Xd settling;
     for (long k = 0; k < count; ++k) moments.push_back(at(k * steps_ / count, settling));
     return moments;

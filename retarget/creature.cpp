@@ -8,13 +8,13 @@
 #include "physics/element_calibration.h"
 #include "retarget/com_path.h"
 #include "retarget/error.h"
+#include "retarget/gravity.h"
 #include "retarget/loop.h"
 #include "retarget/mirror.h"
 
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kGravity = 9.81;
 constexpr double kLargest = 30, kSmallest = 0.01;  // [m] of a creature's longest extent
 constexpr double kSkinRate = 30;                   // [Hz] that will do to look at
 constexpr double kLoopTolerance = 0.02;            // of L

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "retarget/gravity.h"
 #include "retarget/reach.h"
 
 namespace hydrostat::retarget {
@@ -13,7 +14,6 @@ using physics::VectorOf;
 
 constexpr double kLeastResistance = 0.005;  // of the weight [-]: less is not seen
 constexpr double kLeastSpeed = 1e-9;        // beside that of the whole body, over it [-]: less is rounding
-constexpr double kGravity = 9.81;           // [m/s2] of the weight where there is none
 
 std::string number(double value, int digits = 2) {
   char text[40];

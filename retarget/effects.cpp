@@ -14,7 +14,7 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr int kContactSteps = 24;       // of one timing of the ground
+constexpr int kGroundSteps = 24;       // of one timing of the ground
 
 physics::Body without_volume(const physics::Body& body) {
   physics::Body springs = body;
@@ -34,8 +34,8 @@ double stepping_seconds(const physics::Scene& scene, const physics::State& start
   const auto step = [&] { stepper->step(options.step_s, passive, nullptr, state, impulses); };
   step();  // looks for what may touch for the first time: that is no running cost
   const double began = thread_seconds();
-  for (int k = 0; k < kContactSteps; ++k) step();
-  return (thread_seconds() - began) / (kContactSteps * options.step_s);
+  for (int k = 0; k < kGroundSteps; ++k) step();
+  return (thread_seconds() - began) / (kGroundSteps * options.step_s);
 }
 
 /// What `more` of a scene costs: the difference to `less` of it.

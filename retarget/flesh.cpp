@@ -9,6 +9,7 @@
 #include "physics/box_tree.h"
 #include "physics/element_stiffness.h"
 #include "physics/nearest_on_face.h"
+#include "retarget/gravity.h"
 #include "retarget/limbs.h"
 #include "retarget/mesh_places.h"
 #include "retarget/vibration.h"
@@ -22,7 +23,6 @@ constexpr double kInner = 0.5;          // share of the way from bone to skin th
 constexpr double kGroundReach = 0.03;   // of L: skin that comes as near to the ground does not swing
 constexpr double kOwned = 0.1;          // share of a node's bone weights from which on it has regard to a bone
 constexpr double kPoissonsRatio = 0.45;
-constexpr double kGravity = 9.81;       // [m/s2] that kFleshSoftness is about
 constexpr double kMostShear = 0.8;      // of the skin's flesh, in Frobenius' norm: below 1 nothing turns inside out
 
 /// A straight piece of a bone.

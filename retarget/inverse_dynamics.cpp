@@ -17,7 +17,7 @@ namespace {
 constexpr double kTie = 10;  // weight of the rows that tie y to the residual force: they give way by 1 % of the metric of a rigid mode, less elsewhere
 constexpr int kFirstRounds = 6,
               kLaterRounds = 1;         // of linearising the forces of elements, in the first sweep and in those after it
-constexpr double kSettled = 0.01;       // change of an activation that ends the rounds
+constexpr double kSettledActivation = 0.01;       // change of an activation that ends the rounds
 constexpr double kLeastLimit = 0.1;  // of |activation - 1|, where it is chosen
 constexpr double kShapeShare = 0.99;    // of the target's strains that the limit holds,
 constexpr double kMostHeld = 0.03;      // share of the activations that it may hold
@@ -218,7 +218,7 @@ void solve_frame(const Dynamics& dynamics, Eigen::Index f, const Eigen::VectorXd
     const Eigen::VectorXd before = frame.solution.segment(first, edges);
     linearise(dynamics, f, before, frame);
     solve_frame(frame, wish, weight_per_edge);
-    if ((frame.solution.segment(first, edges) - before).cwiseAbs().maxCoeff() < kSettled) break;
+    if ((frame.solution.segment(first, edges) - before).cwiseAbs().maxCoeff() < kSettledActivation) break;
   }
 }
 

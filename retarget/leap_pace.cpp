@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "retarget/gravity.h"
 #include "retarget/smooth.h"
 
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kGravity = 9.81;
 constexpr double kInTheAir = 0.1;      // bearing below which nothing is down
 constexpr double kFalls = 0.5;         // of gravity
 constexpr double kSmoothHz = 10;       // of the centre of mass, as preparation smooths it

@@ -7,7 +7,6 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kLeap = 0.05;     // [s] in the air: less is a flicker of contacts
 constexpr double kFeetOfLeaps = 1.0 / 8, kMomentumOfHops = 0.5;  // of the rows' usual weights
 constexpr double kHorizonOfLeaps = 1.5, kEffortOfHops = 3.2, kNodesOfHops = 3, kSettleOnce = 0.4;  // times the usual
 

@@ -8,7 +8,9 @@
 
 namespace hydrostat::retarget {
 
-/// Whether a frame lies in a flight: for 0.05 s or longer nothing touches; less is a flicker of contacts. F.
+inline constexpr double kLeap = 0.05;  // [s] in the air: less is a flicker of contacts
+
+/// Whether a frame lies in a flight: for kLeap or longer nothing touches. F.
 std::vector<bool> frames_in_flight(const ContactSchedule& contacts, double rate_hz, bool loop);
 
 /// Lets every stance last `frames` longer at both ends, as far as its patch was off the ground there, on the place on which it stands:

@@ -19,8 +19,7 @@ using Triplets = std::vector<Eigen::Triplet<double>>;
 
 constexpr double kJumps = 1e-3;      // per squared change of the deformation from tet to tet, in cells
 constexpr double kAlike = 1;         // per squared difference of the deformation from the solved creature's there, in cells
-constexpr double kInside = 0.3;      // of the inside beside the skin, where nodes are placed
-constexpr double kTouching = 0.003;  // per D: points of a contact that ended higher bear no load
+constexpr double kInsideShare = 0.3;      // of the inside beside the skin, where nodes are placed
 
 /// Share of the skin's area that each vertex stands for.
 Eigen::VectorXd vertex_shares(const SkinnedMesh& skin) {
@@ -142,7 +141,7 @@ Motion carried_motion(const Performer& solved, const Rig& rig, const Creature& l
       }
     }
   }
-  const double inner = kInside / mesh.node_count();
+  const double inner = kInsideShare / mesh.node_count();
   for (int i = 0; i < mesh.node_count(); ++i) {
     if (inside.is_inside[static_cast<std::size_t>(i)]) terms.emplace_back(i, i, inner);
   }

@@ -9,8 +9,8 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kUnseen = 1e-3;    // of a target's largest offset: less is nothing
-constexpr double kEvenness = 0.01;  // of an edge, over what the vertices weigh at a node
+constexpr double kUnseenMorph = 1e-3;    // of a target's largest offset: less is nothing
+constexpr double kEvenMorph = 0.01;  // of an edge, over what the vertices weigh at a node
 
 }  // namespace
 
@@ -38,7 +38,7 @@ std::vector<Eigen::Matrix3Xd> carried_by_nodes(const std::vector<MorphTarget>& m
       trace += skin_embedding.weights(a, v) * skin_embedding.weights(a, v);
     }
   }
-  const double evenness = kEvenness * trace / static_cast<double>(count);
+  const double evenness = kEvenMorph * trace / static_cast<double>(count);
   for (const auto edge : mesh.edges.colwise()) {
     for (const auto& [a, b] : {std::pair(edge[0], edge[1]), std::pair(edge[1], edge[0])}) {
       entries.emplace_back(a, a, evenness);
@@ -69,7 +69,7 @@ std::vector<MorphTarget> left_by_nodes(const std::vector<MorphTarget>& morphs, c
     Eigen::Matrix3Xd offsets = -embedded_positions(skin_embedding, carried[k]);
     for (Eigen::Index i = 0; i < morphs[k].vertices.size(); ++i)
       offsets.col(morphs[k].vertices[i]) += morphs[k].offsets.col(i);
-    const double least = kUnseen * morphs[k].offsets.colwise().norm().maxCoeff();
+    const double least = kUnseenMorph * morphs[k].offsets.colwise().norm().maxCoeff();
     std::vector<int> moved;
     for (int v = 0; v < offsets.cols(); ++v) {
       if (offsets.col(v).norm() > least) moved.push_back(v);

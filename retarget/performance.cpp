@@ -171,6 +171,7 @@ Replay Act::run(const physics::Scene& plant, const ReplayOptions& options) const
   by_signals.feed_forward = signals_of(signals_);
   by_signals.path = &performer_.path;
   by_signals.costs = &costs_;
+  by_signals.answers = &answers_;
   return replay(by_signals, in_world(performer_, options));
 }
 

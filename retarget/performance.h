@@ -7,6 +7,7 @@
 #include "retarget/control_mesh.h"
 #include "retarget/cost_source.h"
 #include "retarget/feedback.h"
+#include "retarget/model_answers.h"
 #include "retarget/morphs.h"
 #include "retarget/nominal_path.h"
 #include "retarget/replay.h"
@@ -51,6 +52,8 @@ class Act {
   Replay run_naively(const physics::Scene& plant, const ReplayOptions& options) const;
   /// How often a regulator's cost to go was found.
   int costs_found() const { return costs_.times_found(); }
+  /// How often the model went to tell how its way is to be steered.
+  int times_asked() const { return answers_.times_asked(); }
 
  private:
   ReplayInput input(const physics::Scene& plant) const;
@@ -60,6 +63,7 @@ class Act {
   const std::optional<physics::Scene> without_obstacles_;  // where the performer's scene has some: the corrector's model knows of none
   const physics::Scene& model_;
   const CostSource costs_;
+  const ModelAnswers answers_;
 };
 
 /// Which free runs are wanted, and how.

@@ -18,11 +18,9 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kTouching = 0.003;    // per D: points of a contact that ended higher bear no load
 constexpr double kGoodBalance = 0.02;  // badness that needs no more contacts
 constexpr double kOverReach = 4.0 / 3; // times reach: what a clip needs beyond that is held back
 constexpr double kFliesOff = 0.7;     // of sqrt(g L), sideways: feet of a trot leave with 0.25, those of a far leap with 1 to 2
-constexpr double kLeap = 0.05;        // [s] in the air: less is a flicker of contacts
 constexpr ShiftCosts kLeapCosts{0.075, 0.2};  // of a leap that would be moved further: it launches by force and lands softly; measured on a frog
 constexpr double kLeapFriction = 1.05;  // times the usual share of friction: it is moved less
 constexpr double kLonger = 1.0 / 60;    // [s] that its stances last longer at both ends

@@ -7,7 +7,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kReach = 0.04, kLeastReach = 0.005;  // per L
-constexpr double kTurn = 0.1;                         // [rad] at the full reach
+constexpr double kFullTurn = 0.1;                         // [rad] at the full reach
 constexpr double kLeak = 0.3;                         // [1/s]
 constexpr double kSpeed = 0.15;                       // of the target's RMS speed
 
@@ -44,7 +44,7 @@ void ReferenceGlide::apply(const Eigen::Vector3d& com, physics::State& reference
 ReferenceGlide make_glide(double speed, double settle_s, double length) {
   ReferenceGlide glide;
   glide.reach = std::clamp(kSpeed * speed * settle_s, kLeastReach * length, kReach * length);
-  glide.turn_reach = kTurn * glide.reach / (kReach * length);
+  glide.turn_reach = kFullTurn * glide.reach / (kReach * length);
   return glide;
 }
 

@@ -16,6 +16,7 @@
 #include "retarget/firm_plan.h"
 #include "retarget/leap_feedback.h"
 #include "retarget/leaps.h"
+#include "retarget/model_answers.h"
 #include "retarget/obstacle_moves.h"
 #include "retarget/path_gain.h"
 #include "retarget/planned_contacts.h"
@@ -91,6 +92,7 @@ class Run {
   Run(const ReplayInput& input, const ReplayOptions& options, std::shared_ptr<const CostToGo> cost);
   void look_at_body();
   void keep_way();
+  void learn_to_steer();
   ReturnMap::Answers ask_model() const;
   WayError go_for_a_cycle(const ReturnMap::Handles& handles);
   const physics::State& estimate();
@@ -227,10 +229,19 @@ void Run::keep_way() {
   return_map_.end_cycle(error);
   if (leap_.is_needed()) leap_.end_cycle(error);
   const bool is_there_time = time_s_ + period <= options_.duration_s + 1e-9;
-  if (return_map_.wants_to_learn() && is_there_time) return_map_.learn(ask_model());
+  if (return_map_.wants_to_learn() && is_there_time) learn_to_steer();
 }
 
-/// What ReturnMap::learn wants to know: the body that the corrector believes in goes for a cycle as often as that.
+/// What others have asked before counts as time of this run, too.
+void Run::learn_to_steer() {
+  if (!input_.answers) return return_map_.learn(ask_model());
+  const ModelAnswers::Answered answered = input_.answers->of(options_, [this] { return ask_model(); });
+  busy_s_ += answered.seconds;
+  return_map_.learn(answered.errors);
+}
+
+/// What ReturnMap::learn wants to know: the body that the corrector believes in goes for a cycle as often as that, each time from the
+/// target's start on, wherever this run is.
 ReturnMap::Answers Run::ask_model() const {
   const ReplayInput believed{input_.model,        input_.model,     input_.prepared,    input_.muscles,
                              input_.feed_forward, input_.clip_skin, input_.skin_points, input_.clip_rise,

@@ -14,6 +14,7 @@
 namespace hydrostat::retarget {
 
 class CostSource;
+class ModelAnswers;
 struct Lesson;
 struct NominalPath;
 
@@ -45,6 +46,7 @@ struct ReplayInput {
   double length = 1, size = 1, limit = 0.3;
   const NominalPath* path = nullptr;      // where the feed-forward takes the body; none: to the target
   const CostSource* costs = nullptr;      // of the model, muscles, target, path and signals that are here; none: a regulator's cost is found anew
+  const ModelAnswers* answers = nullptr;  // likewise of the model; none: it is asked anew
 };
 
 /// Time courses of one replay, one entry a control step.

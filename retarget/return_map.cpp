@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kCyclesAhead = 4;         // over which errors count
 constexpr double kTrial = 0.005;        // activation of a handle while a model is asked; four times that answers four times
-constexpr double kMost = 0.03;          // activation of a handle
+constexpr double kMostHandle = 0.03;          // activation of a handle
 constexpr double kEffort = 0.6;         // per activation of a handle, where errors count per L
 constexpr double kChange = 1;           // the same of how it changes from cycle to cycle: calms those that are hardly answered
 constexpr double kLeastDrift = 0.003;   // per L, a cycle: less is left alone
@@ -84,7 +84,7 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
       period_s_(plan.target.duration_s()),
       yaw_(plan.target.yaw),
       least_drift_(is_dragged(plan.contacts) ? kLeastDrift : kLeastOnLegs),
-      most_(kMost),
+      most_(kMostHandle),
       least_surprise_(kSurprise),
       is_loop_(plan.target.loop) {
   response_.setZero();
@@ -117,7 +117,7 @@ void ReturnMap::end_cycle(const WayError& error) {
     handles_.setZero();
     most_ /= 2;
   } else {
-    if (!handles_.isZero(0) && surprise < kForeseen * allowed) most_ = std::min(kRegrowth * most_, kMost);
+    if (!handles_.isZero(0) && surprise < kForeseen * allowed) most_ = std::min(kRegrowth * most_, kMostHandle);
     drift_ += kNews * news;
     steer();
   }

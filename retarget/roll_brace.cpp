@@ -12,7 +12,7 @@ constexpr double kByRoll = 0.6;        // activation per radian of roll
 constexpr double kByRate = 0.7;        // the same per radian in the time sqrt(h / g)
 constexpr double kTrunk = 0.3;         // share of the trunk's own rate in that; the rest is the body's momentum about the ground
 constexpr double kIdle = 0.1;          // less is left alone: a crawl rolls by as much, and what answers to it rocks on
-constexpr double kMost = 0.5;          // activation
+constexpr double kMostBrace = 0.5;          // activation
 constexpr double kSmoothing = 0.15;    // of sqrt(h / g)
 constexpr double kOwnPlane = 0.4;      // share of the body's own side in that to which it bends; the rest is level
 
@@ -62,7 +62,7 @@ void RollBrace::follow(const RigidFit& fit, const physics::State& reference, con
   const double of_all = inertia > 0 ? -momentum / inertia : 0, of_trunk = std::remainder(roll_ - before, 2 * M_PI) / seconds;
   const double rate = kTrunk * of_trunk + (1 - kTrunk) * of_all;
   const double wanted = -(kByRoll * roll_ + kByRate * swing_s_ * rate);
-  const double most = std::clamp(std::abs(wanted) - kIdle, 0.0, kMost);
+  const double most = std::clamp(std::abs(wanted) - kIdle, 0.0, kMostBrace);
   bend_ += (std::copysign(most, wanted) - bend_) * std::min(1.0, seconds / (kSmoothing * swing_s_));
   side_ = ((1 - kOwnPlane) * (turned.transpose() * left) + kOwnPlane * level_left_of(along_)).normalized();
 }

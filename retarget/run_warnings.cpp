@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "retarget/needed_strain.h"
+#include "retarget/sentence.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -15,14 +15,8 @@ constexpr double kSaturated = 0.05;      // share of the activations
 constexpr double kMiss = 3e-4;           // per L
 constexpr double kRootResidual = 0.01;   // [m g]
 constexpr double kNoTurn = 0.05;         // [deg a cycle] that is not told
+constexpr double kInPlace = 0.005;       // of L (RMS), up to which a place is kept
 constexpr double kFarFromClip = 0.1;     // of L: the eye no longer sees the same motion
-
-template <typename... Numbers>
-std::string sentence(const char* form, Numbers... numbers) {
-  char text[500];
-  std::snprintf(text, sizeof text, form, numbers...);
-  return text;
-}
 
 std::string patches_in_contact(const ContactSchedule& contacts, std::size_t frame) {
   std::string names;
@@ -50,7 +44,9 @@ std::string way_in_words(const ReplayReport& report) {
   const double drift = report.drift_per_cycle_length, turn = std::abs(report.heading_deg_per_cycle);
   const bool tells_turn = turn > kNoTurn;
   if (!travels(report)) {
-    return sentence("is %.0f %% L (RMS) off its place", 100 * off_place(report)) + (tells_turn ? sentence(" and turns by %.1f degrees a cycle", turn) : "");
+    const double off = off_place(report);
+    if (tells_turn && off < kInPlace) return sentence("keeps its place but turns by %.1f degrees a cycle", turn);
+    return sentence("is %.0f %% L (RMS) off its place", 100 * off) + (tells_turn ? sentence(" and turns by %.1f degrees a cycle", turn) : "");
   }
   const std::string way = sentence("makes %.0f %% of the clip's way", 100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length);
   if (std::isnan(drift)) return way;

@@ -17,7 +17,7 @@ using physics::StateOf;
 
 namespace {
 
-constexpr int kRepeats = 3;
+constexpr int kScalingRepeats = 3;
 constexpr std::size_t kStreamed = std::size_t{1} << 23;  // numbers an array: three are more than caches hold
 constexpr int kFused = 1 << 22;                          // rounds of kChains operations on four numbers each
 constexpr int kChains = 12;  // that do not wait for each other: latency times width of today's units
@@ -64,7 +64,7 @@ volatile double kept;  // so that no loop is left out
 
 double measure_flops() {
   double best = std::numeric_limits<double>::infinity();
-  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+  for (int repeat = 0; repeat < kScalingRepeats; ++repeat) {
     const double start = cpu_seconds();
     kept = is_wide() ? fuse_wide() : fuse_plain();
     best = std::min(best, cpu_seconds() - start);
@@ -75,7 +75,7 @@ double measure_flops() {
 double measure_bandwidth() {
   std::vector<double> a(kStreamed, 0.0), b(kStreamed, 1.0), c(kStreamed, 2.0);
   double best = std::numeric_limits<double>::infinity();
-  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+  for (int repeat = 0; repeat < kScalingRepeats; ++repeat) {
     const double start = cpu_seconds();
     for (std::size_t k = 0; k < kStreamed; ++k) a[k] = b[k] + 0.5 * c[k];
     best = std::min(best, cpu_seconds() - start);
@@ -111,7 +111,7 @@ struct Stopwatch {
     };
     step();  // wakes caches and threads
     cpu = clock = std::numeric_limits<double>::infinity();
-    for (int repeat = 0; repeat < kRepeats && is_whole; ++repeat) {
+    for (int repeat = 0; repeat < kScalingRepeats && is_whole; ++repeat) {
       const double cpu_start = cpu_seconds(), start = clock_seconds();
       int steps = 0;
       for (; is_whole && (steps == 0 || clock_seconds() - start < options.least_time); ++steps) step();

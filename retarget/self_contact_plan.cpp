@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <queue>
 
 #include "physics/self_contact.h"
+#include "retarget/sentence.h"
 
 namespace hydrostat::retarget {
 namespace {
@@ -19,13 +19,6 @@ constexpr double kDetour = 3;     // way along the body over the gap [-] from wh
 constexpr double kRing = 2 * std::numbers::pi;  // length over width of a bar that as a ring is strained by 1
 constexpr double kMuchEnergy = 4;  // of what it takes [-]: methods of few iterations are softer than the material
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-template <typename... Numbers>
-std::string sentence(const char* form, Numbers... numbers) {
-  char text[300];
-  std::snprintf(text, sizeof text, form, numbers...);
-  return text;
-}
 
 /// The shortest way along edges from a node to every other [m], infinite to those of other pieces. Source: Dijkstra 1959.
 template <int Dim>

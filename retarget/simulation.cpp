@@ -9,6 +9,7 @@
 #include "physics/tearing.h"
 #include "retarget/cpu_seconds.h"
 #include "retarget/divergence.h"
+#include "retarget/gravity.h"
 #include "retarget/obstacle_moves.h"
 #include "retarget/simulation_record.h"
 
@@ -19,7 +20,6 @@ using physics::PointsOf;
 using physics::SpinOf;
 using physics::VectorOf;
 
-constexpr double kGravity = 9.81;  // [m/s2] of the units in which figures are told
 
 template <int Dim>
 Eigen::Vector3d in_space(const VectorOf<Dim>& place) {

@@ -12,7 +12,7 @@ namespace {
 constexpr int kDirections = 16;
 constexpr double kInside = 0.25;     // of the support's width: so far inside lies the centre of mass that was outside
 constexpr double kLeastShare = 0.2;
-constexpr int kRounds = 8;          // a body that hangs over a corner does so in more than one direction
+constexpr int kBalanceRounds = 8;          // a body that hangs over a corner does so in more than one direction
 
 /// How far the nodes (N x directions) and the support reach in each direction, mean over the frames in which there is any.
 struct Reach {
@@ -73,14 +73,14 @@ StaticBalance balance_statically(const Motion& nodes, const Motion& points, cons
   balance.mass_shares = Eigen::VectorXd::Ones(mass.size());
   const Reach reach = mean_reach(nodes, points, mass, height);
   if (!reach.is_any) return balance;
-  for (int round = 0; round <= kRounds; ++round) {
+  for (int round = 0; round <= kBalanceRounds; ++round) {
     const Eigen::VectorXd left = mass.cwiseProduct(balance.mass_shares);
     const Eigen::VectorXd overhangs = reach.nodes.transpose() * left / left.sum() - reach.support;
     int worst = 0;
     const double overhang = overhangs.maxCoeff(&worst);
     if (round == 0) balance.overhang = std::max(0.0, overhang);
     balance.stands = overhang <= 0;
-    if (balance.stands || round == kRounds) break;
+    if (balance.stands || round == kBalanceRounds) break;
     const Eigen::VectorXd levers = reach.nodes.col(worst).array() - reach.support[worst] + kInside * reach.width(worst);
     balance.mass_shares = balance.mass_shares.cwiseMin(shares_for(levers, left.cwiseQuotient(balance.mass_shares)));
   }

@@ -9,7 +9,7 @@ namespace {
 constexpr double kSmooth = 0.03;            // [s] of each pass
 constexpr double kMemory = 1;               // [s]
 constexpr double kUnsure = 0.1;             // of the plan's strength, before anything was seen
-constexpr double kLeast = 0.5, kMost = 2;   // of the ratio, and of that of masses
+constexpr double kLeast = 0.5, kMostRatio = 2;   // of the ratio, and of that of masses
 
 Eigen::Matrix3d stretching(const Eigen::Matrix3d& moment) {
   const Eigen::Matrix3d symmetric = (moment + moment.transpose()) / 2;
@@ -27,7 +27,7 @@ StrengthEstimate::StrengthEstimate(const physics::Scene& model, double interval_
       force_(3, model.body.node_count()) {}
 
 double StrengthEstimate::mass_ratio() const {
-  return momentum_squared_ > 0 && momentum_touch_ > 0 ? std::clamp(momentum_touch_ / momentum_squared_, kLeast, kMost) : 1;
+  return momentum_squared_ > 0 && momentum_touch_ > 0 ? std::clamp(momentum_touch_ / momentum_squared_, kLeast, kMostRatio) : 1;
 }
 
 /// The mean over the step of the forces that the plan's body would have.
@@ -74,7 +74,7 @@ void StrengthEstimate::fit() {
   const double fitted = wanted_push_ / push_squared_;
   const double missed = std::max(0.0, wanted_squared_ - fitted * wanted_push_) / push_squared_;
   const double variance = missed * steps_alike_ / looks_, before = kUnsure * kUnsure;
-  ratio_ = std::clamp(1 + (fitted - 1) * before / (before + variance), kLeast, kMost);
+  ratio_ = std::clamp(1 + (fitted - 1) * before / (before + variance), kLeast, kMostRatio);
 }
 
 void StrengthEstimate::apply(const Eigen::Matrix3Xd& x, Eigen::VectorXd& activation) const {

@@ -8,10 +8,10 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kMost = 0.1;          // change of the swing; activation by which a body steers
-constexpr double kLeastStride = 0.02;  // of L
+constexpr double kMostChange = 0.1;          // change of the swing; activation by which a body steers
+constexpr double kNoStride = 0.02;  // of L
 constexpr double kLeastStretch = 0.5;  // of a stride: what stretches less does not travel by it
-constexpr int kSamples = 64;           // of a period
+constexpr int kPhases = 64;           // of a period
 constexpr double kStridesAhead = 4;    // within which the path is met again
 constexpr double kMostHeading = 0.2;   // [rad], towards the path
 // Bend by error of heading. Ends that stick would turn the body by the whole bend in a cycle; a soft body on ends that
@@ -32,12 +32,12 @@ StrideFeedback::StrideFeedback(const PreparedTarget& plan, double length, const 
   cycle_ = after_cycles(plan.target, 1);
   period_s_ = plan.target.duration_s();
   const Eigen::Vector3d centre = plan.target.at(0).rowwise().mean(), stride = level(cycle_ * centre - centre);
-  if (stride.norm() < kLeastStride * length) return;
+  if (stride.norm() < kNoStride * length) return;
   mean_.setZero(constraints.cols());
   Eigen::VectorXd sample = mean_;
-  for (int k = 0; k < kSamples; ++k) {
-    feed_forward(period_s_ * k / kSamples, sample);
-    mean_ += sample / kSamples;
+  for (int k = 0; k < kPhases; ++k) {
+    feed_forward(period_s_ * k / kPhases, sample);
+    mean_ += sample / kPhases;
   }
   learn_to_steer(plan.target, stride, constraints);
 }
@@ -58,7 +58,7 @@ void StrideFeedback::learn_to_steer(const Motion& target, const Eigen::Vector3d&
     const Eigen::Vector3d from = target.at(0).col(constraints(0, e)), to = target.at(0).col(constraints(1, e));
     bend_[e] = right.dot((from + to) / 2 - centre) * std::pow((to - from).normalized().dot(way), 2) / middle;
   }
-  most_steering_ = std::min(kMost / bend_.cwiseAbs().maxCoeff(), kMostBend);
+  most_steering_ = std::min(kMostChange / bend_.cwiseAbs().maxCoeff(), kMostBend);
 }
 
 void StrideFeedback::follow(const RigidFit& fit, double seconds) {
@@ -67,7 +67,7 @@ void StrideFeedback::follow(const RigidFit& fit, double seconds) {
   const Eigen::Vector3d off = level(fit.mean_b - fit.mean_a);
   const double smoothing = 1 - std::exp(-2 * seconds / period_s_);
   const double spare = steers() ? 1 - std::abs(steering_) / most_steering_ : 1;
-  const double most = kMost * std::min(spare / kSpareBend, 1.0);
+  const double most = kMostChange * std::min(spare / kSpareBend, 1.0);
   gain_ += (std::clamp(-off.dot(way) / stride.norm(), -most, most) - gain_) * smoothing;
   // Turns about y: what lies to the left is met by a turn to the right.
   const double left = off.dot(Eigen::Vector3d::UnitY().cross(way));

@@ -10,7 +10,7 @@ namespace {
 constexpr double kHighestStep = 0.1;   // per L
 constexpr double kTouched = 1e-4;      // per L: as near to a surface a ray has met it
 constexpr double kUneven = 2e-3;       // per L: less is no step
-constexpr double kSmooth = 0.1;        // [s] in which the reference follows the ground
+constexpr double kGroundSmooth = 0.1;        // [s] in which the reference follows the ground
 constexpr double kNarrow = 0.1;        // per L: feet that stand nearer to each other tell little of a slope
 constexpr int kMostMarches = 64;
 constexpr double kFoothold = 0.01;     // per L: between places that a foot may land on
@@ -141,7 +141,7 @@ void UnevenGround::look_ahead(Foot& foot, double time_s, double seconds, const R
   }
   const bool is_step = most > std::min(here, landing) + kUneven * length_;
   foot.lift = most + (is_step ? clearance_ * length_ : 0);
-  const double share = is_first_ ? 1 : 1 - std::exp(-seconds / kSmooth);
+  const double share = is_first_ ? 1 : 1 - std::exp(-seconds / kGroundSmooth);
   foot.ground += share * (landing - foot.ground);
 }
 

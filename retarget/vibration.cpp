@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kMostRounds = 60;
 constexpr double kSettled = 1e-6;  // relative change of the squared frequencies in a round
-constexpr Eigen::Index kSpare = 8;  // vectors beyond those that are wanted: what converges last is not asked for
+constexpr Eigen::Index kSpareVectors = 8;  // vectors beyond those that are wanted: what converges last is not asked for
 
 Eigen::MatrixXd random_vectors(Eigen::Index rows, Eigen::Index columns) {
   std::mt19937 random(1);
@@ -20,7 +20,7 @@ Eigen::MatrixXd random_vectors(Eigen::Index rows, Eigen::Index columns) {
 }  // namespace
 
 Vibration lowest_modes(const Eigen::SparseMatrix<double>& stiffness, const Eigen::VectorXd& mass, Eigen::Index count) {
-  const Eigen::Index size = mass.size(), kept = std::min(count, size), width = std::min(kept + kSpare, size);
+  const Eigen::Index size = mass.size(), kept = std::min(count, size), width = std::min(kept + kSpareVectors, size);
   Vibration result;
   if (kept == 0) return result;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(stiffness);

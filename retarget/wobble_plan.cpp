@@ -13,9 +13,9 @@ namespace {
 
 constexpr Eigen::Index kSought = 16, kMostKept = 8;  // modes; the latter for what reads glTF
 constexpr double kSeen = 0.003;                      // of L: less is not seen
-constexpr double kLeastShare = 0.1;                  // of that: a mode below is left out
+constexpr double kLeastModeShare = 0.1;                  // of that: a mode below is left out
 constexpr double kUnseen = 1e-3;                     // of a mode's largest offset: less is nothing
-constexpr double kForgotten = 7;                     // time constants of a mode after which its start no longer counts
+constexpr double kStartForgotten = 7;                     // time constants of a mode after which its start no longer counts
 constexpr Eigen::Index kTimedFrames = 12;
 
 /// Amplitudes of the target, K x F, not limited; `wobble.start` becomes that of its first frame.
@@ -30,7 +30,7 @@ Eigen::MatrixXd target_amplitudes(const Performer& performer, Wobble& wobble) {
   Eigen::MatrixXd closed(loads.rows(), loads.cols() + 1);
   closed << loads, loads.col(0);
   for (Eigen::Index k = 0; k < w.size(); ++k) {
-    const double periods = std::ceil(kForgotten / (kWobbleDamping * w[k]) / target.duration_s());
+    const double periods = std::ceil(kStartForgotten / (kWobbleDamping * w[k]) / target.duration_s());
     Eigen::Vector2d now = wobble.start.row(k);
     for (double period = 0; period < periods; ++period) {
       for (Eigen::Index f = 0; f < loads.cols(); ++f)
@@ -111,7 +111,7 @@ Wobble plan_wobble(const Performer& performer, const Rig& rig, Wish wish) {
   Wobble all = modes_of(performer, rig);
   if (!all.is_on()) return all;
   Eigen::MatrixXd amplitudes = target_amplitudes(performer, all);
-  const double least = wish == Wish::kOn ? 0 : kLeastShare * kSeen * performer.length;
+  const double least = wish == Wish::kOn ? 0 : kLeastModeShare * kSeen * performer.length;
   const std::vector<Eigen::Index> modes = driven_modes(amplitudes, least);
   Wobble kept = with_modes(all, modes);
   amplitudes = amplitudes(modes, Eigen::all).eval();

@@ -201,6 +201,32 @@ TEST(PerformSteadily, FindsTheCostToGoOnceAndGoesByItAsEachRunDoesByItsOwn) {
   EXPECT_GE(regulated, 1) << "nothing went by what was found";
 }
 
+/// Bodies that are pushed off their way, whoever of them asks first.
+TEST(Act, AsksItsModelOnceHowToSteerAndGoesAsEachBodyDoesByItself) {
+  Performer performer = make_box_performer();
+  performer.scene.ground.friction = 0.1;  // it slides on for cycles
+  const SignalSet signals = signals_of(performer);
+  const physics::Scene heavy = varied_scene(performer.scene, {1.1, 1, 1});
+  ReplayOptions options = lasting(4 * performer.prepared.target.duration_s()).replay;
+  const auto pushed = [&](double speed) {
+    ReplayOptions by_push = options;
+    by_push.pushes.push_back({.delta_v = {speed, 0, 0}});
+    return by_push;
+  };
+  const Act act(performer, signals);
+  const Replay first = act.run(heavy, pushed(0.3)), second = act.run(performer.scene, pushed(0.4));
+  EXPECT_EQ(act.times_asked(), 1);
+  EXPECT_EQ(first.motion.frames, Act(performer, signals).run(heavy, pushed(0.3)).motion.frames);
+  EXPECT_EQ(second.motion.frames, Act(performer, signals).run(performer.scene, pushed(0.4)).motion.frames);
+  options.corrector.effort *= 2;
+  EXPECT_EQ(act.run(heavy, pushed(0.3)).motion.frames, Act(performer, signals).run(heavy, pushed(0.3)).motion.frames);
+  EXPECT_EQ(act.times_asked(), 2) << "by other feedback the model goes otherwise";
+  options.keep_way = false;
+  options.corrector.horizon_s *= 2;
+  act.run(heavy, pushed(0.3));
+  EXPECT_EQ(act.times_asked(), 2) << "nobody wants to know";
+}
+
 /// Whichever of its bodies went first.
 TEST(Act, GoesByTheCostToGoOfItsPlanOnWhateverBody) {
   const Performer plain = make_box_performer();

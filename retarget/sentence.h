@@ -1,0 +1,17 @@
+#pragma once
+
+#include <array>
+#include <cstdio>
+#include <string>
+
+namespace hydrostat::retarget {
+
+/// printf's, up to 500 characters.
+template <typename... Numbers>
+std::string sentence(const char* form, Numbers... numbers) {
+  std::array<char, 500> text;
+  std::snprintf(text.data(), text.size(), form, numbers...);
+  return text.data();
+}
+
+}  // namespace hydrostat::retarget

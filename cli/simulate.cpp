@@ -30,9 +30,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kSimulateCommand = "hydrostat simulate";
-constexpr double kLongestRun = 3600;       // [s]
-constexpr double kFirstMeasured = 2;    // [s] of the motion, on which most settings are tried where --max-error is asked for
-constexpr double kLargestTrace = 4e9;   // [bytes]
+constexpr double kLongestRun = 3600;   // [s]
+constexpr double kFirstMeasured = 2;   // [s] of the motion, on which most settings are tried where --max-error is asked for
+constexpr double kLargestTrace = 4e9;  // [bytes]
 
 struct SimulateCommand {
   std::string scene, out, method, trace;

@@ -8,7 +8,7 @@
 namespace hydrostat::io {
 namespace {
 
-constexpr Eigen::Index kMostTargets = 8;  // that every reader of glTF is asked to know
+constexpr Eigen::Index kMostTargets = 8;     // that every reader of glTF is asked to know
 constexpr Eigen::Index kNormalSamples = 64;  // frames that the targets are fitted to
 constexpr double kNormalsEnough = 0.035;     // [rad] RMS
 

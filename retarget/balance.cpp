@@ -11,11 +11,11 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kBalanceWeight = 60;     // W: per mg of missing force
-constexpr double kShiftWeight = 1;        // per L of shift of the COM, per radian of the trunk
-constexpr double kBendWeight = 2;         // per L (radian) of third difference, at 60 Hz
-constexpr double kForceEffort = 0.1;      // per mg of contact force, in the midst of a stance
-constexpr double kForceAloneWeight = 0.3; // where the forces alone are sought: makes their split unique
+constexpr double kBalanceWeight = 60;                    // W: per mg of missing force
+constexpr double kShiftWeight = 1;                       // per L of shift of the COM, per radian of the trunk
+constexpr double kBendWeight = 2;                        // per L (radian) of third difference, at 60 Hz
+constexpr double kContactForceWeight = 0.1;              // per mg of contact force, in the midst of a stance
+constexpr double kForceAloneWeight = 0.3;                // where the forces alone are sought: makes their split unique
 constexpr double kEdgeForceWeight[] = {0.4, 0.2, 0.13};  // in its first and last frames: loads come and go gently
 
 /// Momentum of a motion, frame by frame.
@@ -229,7 +229,7 @@ BoundedLeastSquares shift_problem(const Motion& target, const physics::Scene& sc
     rows.end_block(-w * frame.want);
     for (long k = 0; k < forces; ++k) {
       const int age = frames_from_edge(contacts, frame.generators[static_cast<std::size_t>(k)].point, f, target.loop);
-      rows.add(rows.next(), column + k, costs.forces * (age < 3 ? kEdgeForceWeight[age] : kForceEffort));
+      rows.add(rows.next(), column + k, costs.forces * (age < 3 ? kEdgeForceWeight[age] : kContactForceWeight));
       rows.end_block(Eigen::VectorXd::Zero(1));
       problem.column_blocks.push_back(static_cast<int>(column + k + 1));
     }

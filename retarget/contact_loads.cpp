@@ -4,11 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "retarget/gravity.h"
+
 namespace hydrostat::retarget {
 namespace {
 
 constexpr double kPointLoad = 1e-6, kPatchLoad = 0.01;  // [m g]
-constexpr double kEarth = 9.81;                         // [m/s2]
 constexpr double kFarAway = 1e300;                      // [m]
 constexpr double kSink = 5e-4, kSinkTime = 1.0 / 30;    // of L; [s]
 constexpr double kStillSpeed = 0.01;                    // of sqrt(g L): a loaded patch that moves faster slides
@@ -28,7 +29,7 @@ ContactThresholds contact_thresholds(const physics::Scene& scene, double length,
 
 double gravity_unit(const physics::Scene& scene) {
   const double gravity = scene.gravity.norm();
-  return gravity > 0 ? gravity : kEarth;
+  return gravity > 0 ? gravity : kGravity;
 }
 
 double contact_stiffness(const physics::Scene& scene, double length, double horizon_s) {

@@ -14,10 +14,10 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kForgotten = 1;      // [s] ahead, from which on the end of a recursion does not matter
-constexpr long kMoments = 12;         // moments that modes are found in
-constexpr long kMostMatrices = 400;   // that are kept
-constexpr double kEndWeight = 10;     // of a deviation at the end, over that of a step
+constexpr double kForgotten = 1;     // [s] ahead, from which on the end of a recursion does not matter
+constexpr long kMoments = 12;        // moments that modes are found in
+constexpr long kMostMatrices = 400;  // that are kept
+constexpr double kEndWeight = 10;    // of a deviation at the end, over that of a step
 
 /// The planned motion halfway through its control steps, where its forces balance.
 class Moments {

@@ -9,9 +9,9 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kPartsApart = 3;  // widths [-] between the middles of parts that do not meet yet
-constexpr double kSwing = 2;       // of L [m]: how far the middle of a clamped body sinks, at most
-constexpr double kTouch = 1e-6;    // of L [m]: how deep a body may start in what it touches
+constexpr double kPartsApart = 3;   // widths [-] between the middles of parts that do not meet yet
+constexpr double kSwing = 2;        // of L [m]: how far the middle of a clamped body sinks, at most
+constexpr double kTouch = 1e-6;     // of L [m]: how deep a body may start in what it touches
 constexpr double kForEver = 1e299;  // [s]: a clamp that lets go then never does
 
 template <int Dim>

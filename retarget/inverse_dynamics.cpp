@@ -17,13 +17,13 @@ namespace {
 constexpr double kTie = 10;  // weight of the rows that tie y to the residual force: they give way by 1 % of the metric of a rigid mode, less elsewhere
 constexpr int kFirstRounds = 6,
               kLaterRounds = 1;         // of linearising the forces of elements, in the first sweep and in those after it
-constexpr double kSettledActivation = 0.01;       // change of an activation that ends the rounds
-constexpr double kLeastLimit = 0.1;  // of |activation - 1|, where it is chosen
-constexpr double kShapeShare = 0.99;    // of the target's strains that the limit holds,
-constexpr double kMostHeld = 0.03;      // share of the activations that it may hold
-constexpr double kWiden = 1.5;          // times as wide where it holds more
-constexpr double kCarries = 1e-6;   // share of a contact point from which a node carries it
-constexpr double kForceWeight = 0.1;    // per contact force in m g, in mm per m of L: makes the split of loads unique
+constexpr double kSettledActivation = 0.01;  // change of an activation that ends the rounds
+constexpr double kLeastLimit = 0.1;          // of |activation - 1|, where it is chosen
+constexpr double kShapeShare = 0.99;         // of the target's strains that the limit holds,
+constexpr double kMostHeld = 0.03;           // share of the activations that it may hold
+constexpr double kWiden = 1.5;               // times as wide where it holds more
+constexpr double kCarries = 1e-6;            // share of a contact point from which a node carries it
+constexpr double kForceWeight = 0.1;         // per contact force in m g, in mm per m of L: makes the split of loads unique
 
 /// Everything about one frame that does not change from sweep to sweep.
 struct Frame {

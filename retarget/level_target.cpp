@@ -8,6 +8,7 @@
 #include <map>
 
 #include "retarget/balance.h"
+#include "retarget/contacts.h"
 #include "retarget/mesh_places.h"
 #include "retarget/sag.h"
 #include "retarget/shape_projection.h"
@@ -17,9 +18,9 @@ namespace {
 
 using Triplets = std::vector<Eigen::Triplet<double>>;
 
-constexpr double kJumps = 1e-3;      // per squared change of the deformation from tet to tet, in cells
-constexpr double kAlike = 1;         // per squared difference of the deformation from the solved creature's there, in cells
-constexpr double kInsideShare = 0.3;      // of the inside beside the skin, where nodes are placed
+constexpr double kJumps = 1e-3;       // per squared change of the deformation from tet to tet, in cells
+constexpr double kAlike = 1;          // per squared difference of the deformation from the solved creature's there, in cells
+constexpr double kInsideShare = 0.3;  // of the inside beside the skin, where nodes are placed
 
 /// Share of the skin's area that each vertex stands for.
 Eigen::VectorXd vertex_shares(const SkinnedMesh& skin) {

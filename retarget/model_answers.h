@@ -1,8 +1,8 @@
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <mutex>
+#include <vector>
 
 #include "retarget/replay.h"
 #include "retarget/return_map.h"
@@ -35,7 +35,7 @@ class ModelAnswers {
     Answered answered;
   };
   mutable std::mutex mutex_;
-  mutable std::deque<Entry> entries_;
+  mutable std::vector<Entry> entries_;
 };
 
 }  // namespace hydrostat::retarget

@@ -9,8 +9,8 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kUnseenMorph = 1e-3;    // of a target's largest offset: less is nothing
-constexpr double kEvenMorph = 0.01;  // of an edge, over what the vertices weigh at a node
+constexpr double kUnseenMorph = 1e-3;  // of a target's largest offset: less is nothing
+constexpr double kEvenMorph = 0.01;    // of an edge, over what the vertices weigh at a node
 
 }  // namespace
 

@@ -7,7 +7,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr double kReach = 0.04, kLeastReach = 0.005;  // per L
-constexpr double kFullTurn = 0.1;                         // [rad] at the full reach
+constexpr double kFullTurn = 0.1;                     // [rad] at the full reach
 constexpr double kLeak = 0.3;                         // [1/s]
 constexpr double kSpeed = 0.15;                       // of the target's RMS speed
 

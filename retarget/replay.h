@@ -46,7 +46,7 @@ struct ReplayInput {
   double length = 1, size = 1, limit = 0.3;
   const NominalPath* path = nullptr;      // where the feed-forward takes the body; none: to the target
   const CostSource* costs = nullptr;      // of the model, muscles, target, path and signals that are here; none: a regulator's cost is found anew
-  const ModelAnswers* answers = nullptr;  // likewise of the model; none: it is asked anew
+  const ModelAnswers* answers = nullptr;  // likewise; none: the model is asked anew
 };
 
 /// Time courses of one replay, one entry a control step.

@@ -11,15 +11,15 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr int kCyclesAhead = 4;         // over which errors count
-constexpr double kTrial = 0.005;        // activation of a handle while a model is asked; four times that answers four times
-constexpr double kMostHandle = 0.03;          // activation of a handle
-constexpr double kEffort = 0.6;         // per activation of a handle, where errors count per L
-constexpr double kChange = 1;           // the same of how it changes from cycle to cycle: calms those that are hardly answered
-constexpr double kLeastDrift = 0.003;   // per L, a cycle: less is left alone
-constexpr double kLeastOnLegs = 0.015;  // the same of what steps freely, for its corrector holds the way but on slopes
-constexpr double kThrown = 0.15;        // the same: what goes further astray falls or was pushed, and bends do not bring it back
-constexpr double kNews = 0.5;           // share of what a cycle did beyond what was foreseen that counts as drift
+constexpr int kCyclesAhead = 4;           // over which errors count
+constexpr double kTrial = 0.005;          // activation of a handle while a model is asked; four times that answers four times
+constexpr double kMostHandle = 0.03;      // activation of a handle
+constexpr double kEffort = 0.6;           // per activation of a handle, where errors count per L
+constexpr double kChange = 1;             // the same of how it changes from cycle to cycle: calms those that are hardly answered
+constexpr double kLeastDrift = 0.003;     // per L, a cycle: less is left alone
+constexpr double kLeastOnLegs = 0.015;    // the same of what steps freely, for its corrector holds the way but on slopes
+constexpr double kThrown = 0.15;          // the same: what goes further astray falls or was pushed, and bends do not bring it back
+constexpr double kNews = 0.5;             // share of what a cycle did beyond what was foreseen that counts as drift
 constexpr double kSurprise = 0.05;        // per L, of a cycle beyond what was foreseen: a push, or a response that does not hold
 constexpr double kSurpriseOfLeap = 0.15;  // of a stride, where that is more: a leap's heading shows where it lands
 constexpr double kHolds = 0.5;            // of what the handles were to do, where that is more: what holds by half steers

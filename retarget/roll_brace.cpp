@@ -7,14 +7,14 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kSlender = 2;         // what is less slender rolls about no axis of its own
-constexpr double kByRoll = 0.6;        // activation per radian of roll
-constexpr double kByRate = 0.7;        // the same per radian in the time sqrt(h / g)
-constexpr double kTrunk = 0.3;         // share of the trunk's own rate in that; the rest is the body's momentum about the ground
-constexpr double kIdle = 0.1;          // less is left alone: a crawl rolls by as much, and what answers to it rocks on
-constexpr double kMostBrace = 0.5;          // activation
-constexpr double kSmoothing = 0.15;    // of sqrt(h / g)
-constexpr double kOwnPlane = 0.4;      // share of the body's own side in that to which it bends; the rest is level
+constexpr double kSlender = 2;       // what is less slender rolls about no axis of its own
+constexpr double kByRoll = 0.6;      // activation per radian of roll
+constexpr double kByRate = 0.7;      // the same per radian in the time sqrt(h / g)
+constexpr double kTrunk = 0.3;       // share of the trunk's own rate in that; the rest is the body's momentum about the ground
+constexpr double kIdle = 0.1;        // less is left alone: a crawl rolls by as much, and what answers to it rocks on
+constexpr double kMostBrace = 0.5;   // activation
+constexpr double kSmoothing = 0.15;  // of sqrt(h / g)
+constexpr double kOwnPlane = 0.4;    // share of the body's own side in that to which it bends; the rest is level
 
 Eigen::Vector3d level_left_of(const Eigen::Vector3d& way) { return Eigen::Vector3d::UnitY().cross(way).normalized(); }
 

@@ -45,7 +45,7 @@ std::string way_in_words(const ReplayReport& report) {
   const bool tells_turn = turn > kNoTurn;
   if (!travels(report)) {
     const double off = off_place(report);
-    if (tells_turn && off < kInPlace) return sentence("keeps its place but turns by %.1f degrees a cycle", turn);
+    if (tells_turn && off < kInPlace) return sentence("turns by %.1f degrees a cycle on its place", turn);
     return sentence("is %.0f %% L (RMS) off its place", 100 * off) + (tells_turn ? sentence(" and turns by %.1f degrees a cycle", turn) : "");
   }
   const std::string way = sentence("makes %.0f %% of the clip's way", 100 * report.travel_per_cycle_length / report.clip_travel_per_cycle_length);

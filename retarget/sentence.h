@@ -6,7 +6,7 @@
 
 namespace hydrostat::retarget {
 
-/// printf's, up to 500 characters.
+/// As printf has it; what is beyond 499 characters is cut.
 template <typename... Numbers>
 std::string sentence(const char* form, Numbers... numbers) {
   std::array<char, 500> text;

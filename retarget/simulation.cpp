@@ -20,7 +20,6 @@ using physics::PointsOf;
 using physics::SpinOf;
 using physics::VectorOf;
 
-
 template <int Dim>
 Eigen::Vector3d in_space(const VectorOf<Dim>& place) {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();

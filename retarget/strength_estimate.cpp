@@ -6,10 +6,10 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kSmooth = 0.03;            // [s] of each pass
-constexpr double kMemory = 1;               // [s]
-constexpr double kUnsure = 0.1;             // of the plan's strength, before anything was seen
-constexpr double kLeast = 0.5, kMostRatio = 2;   // of the ratio, and of that of masses
+constexpr double kSmooth = 0.03;                // [s] of each pass
+constexpr double kMemory = 1;                   // [s]
+constexpr double kUnsure = 0.1;                 // of the plan's strength, before anything was seen
+constexpr double kLeast = 0.5, kMostRatio = 2;  // of the ratio, and of that of masses
 
 Eigen::Matrix3d stretching(const Eigen::Matrix3d& moment) {
   const Eigen::Matrix3d symmetric = (moment + moment.transpose()) / 2;

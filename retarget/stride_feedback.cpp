@@ -8,10 +8,10 @@
 namespace hydrostat::retarget {
 namespace {
 
-constexpr double kMostChange = 0.1;          // change of the swing; activation by which a body steers
-constexpr double kNoStride = 0.02;  // of L
+constexpr double kMostChange = 0.1;    // change of the swing; activation by which a body steers
+constexpr double kNoStride = 0.02;     // of L
 constexpr double kLeastStretch = 0.5;  // of a stride: what stretches less does not travel by it
-constexpr int kPhases = 64;           // of a period
+constexpr int kPhases = 64;            // of a period
 constexpr double kStridesAhead = 4;    // within which the path is met again
 constexpr double kMostHeading = 0.2;   // [rad], towards the path
 // Bend by error of heading. Ends that stick would turn the body by the whole bend in a cycle; a soft body on ends that

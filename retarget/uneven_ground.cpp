@@ -10,13 +10,13 @@ namespace {
 constexpr double kHighestStep = 0.1;   // per L
 constexpr double kTouched = 1e-4;      // per L: as near to a surface a ray has met it
 constexpr double kUneven = 2e-3;       // per L: less is no step
-constexpr double kGroundSmooth = 0.1;        // [s] in which the reference follows the ground
+constexpr double kGroundSmooth = 0.1;  // [s] in which the reference follows the ground
 constexpr double kNarrow = 0.1;        // per L: feet that stand nearer to each other tell little of a slope
 constexpr int kMostMarches = 64;
-constexpr double kFoothold = 0.01;     // per L: between places that a foot may land on
-constexpr int kFarthest = 8;           // of those from where it would land
-constexpr int kFromEdge = 2;           // of those: so far off an edge a foot is to stand
-constexpr double kStay = 0.5;          // what leaving a chosen place costs, against what going there does
+constexpr double kFoothold = 0.01;  // per L: between places that a foot may land on
+constexpr int kFarthest = 8;        // of those from where it would land
+constexpr int kFromEdge = 2;        // of those: so far off an edge a foot is to stand
+constexpr double kStay = 0.5;       // what leaving a chosen place costs, against what going there does
 
 /// The outermost of a patch's points to four sides, in the target's first frame.
 std::vector<int> outermost(const Patch& patch, const Eigen::Ref<const Eigen::Matrix3Xd>& places) {

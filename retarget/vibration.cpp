@@ -9,7 +9,7 @@ namespace hydrostat::retarget {
 namespace {
 
 constexpr int kMostRounds = 60;
-constexpr double kSettled = 1e-6;  // relative change of the squared frequencies in a round
+constexpr double kSettled = 1e-6;          // relative change of the squared frequencies in a round
 constexpr Eigen::Index kSpareVectors = 8;  // vectors beyond those that are wanted: what converges last is not asked for
 
 Eigen::MatrixXd random_vectors(Eigen::Index rows, Eigen::Index columns) {

@@ -13,9 +13,9 @@ namespace {
 
 constexpr Eigen::Index kSought = 16, kMostKept = 8;  // modes; the latter for what reads glTF
 constexpr double kSeen = 0.003;                      // of L: less is not seen
-constexpr double kLeastModeShare = 0.1;                  // of that: a mode below is left out
+constexpr double kLeastModeShare = 0.1;              // of that: a mode below is left out
 constexpr double kUnseen = 1e-3;                     // of a mode's largest offset: less is nothing
-constexpr double kStartForgotten = 7;                     // time constants of a mode after which its start no longer counts
+constexpr double kStartForgotten = 7;                // time constants of a mode after which its start no longer counts
 constexpr Eigen::Index kTimedFrames = 12;
 
 /// Amplitudes of the target, K x F, not limited; `wobble.start` becomes that of its first frame.

@@ -37,11 +37,11 @@ constexpr double kHeading = 0.3;  // [deg] a cycle
 constexpr double kMiss = 3e-4, kRootResidual = 0.01, kSaturated = 0.05;
 
 // Of a trace at the rate of the control.
-constexpr double kMomentum = 1e-6;       // [mg]
+constexpr double kMomentum = 1e-6;         // [mg]
 constexpr double kAngularMomentum = 1e-3;  // [mgL]: the moment of gravity is taken at the row's middle
 constexpr double kContactMoment = 0.03;    // [mgL]: of the forces at the row's middle, between which the nodes shake
 constexpr double kPathMiss = 0.3;          // of the way: landing and standing shake within a row
-constexpr double kNearGround = 0.002;    // [per L]
+constexpr double kNearGround = 0.002;      // [per L]
 
 // Of a jump.
 constexpr double kFallMiss = 0.02;     // [g] of the COM's acceleration while nothing touches
@@ -220,13 +220,13 @@ class Samples : public testing::Test {
 };
 
 TEST_F(Samples, TheWormCrawlsAsPlannedAndATenthOffThePlanByWhatIsFedBackFromCycleToCycle) {
-  expect_creature(kGates[0]);
+  ASSERT_NO_FATAL_FAILURE(expect_creature(kGates[0]));
   expect_gates_off_the_plan(/*bodies=*/2, /*cycles=*/8, 0.005);
   EXPECT_GT(let_go(1, 5, /*keep_way=*/false).drift_per_cycle_length, 0.005);
 }
 
 TEST_F(Samples, TheDogTrotsAsPlannedAndATenthOffThePlanForFiftyCycles) {
-  expect_creature(kGates[1]);
+  ASSERT_NO_FATAL_FAILURE(expect_creature(kGates[1]));
   expect_gates_off_the_plan(/*bodies=*/2, /*cycles=*/50, 0.01);
 }
 

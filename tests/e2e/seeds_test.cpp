@@ -12,9 +12,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kUsualSeeds = 2;        // HYDROSTAT_SEEDS asks for more
-constexpr double kLeastShare = 0.7;   // of the seeds that must pass
-constexpr double kNaiveDrift = 5;     // times the closed loop's, at least, where the naive run stays up at all
+constexpr int kUsualSeeds = 2;       // HYDROSTAT_SEEDS asks for more
+constexpr double kLeastShare = 0.7;  // of the seeds that must pass
+constexpr double kNaiveDrift = 5;    // times the closed loop's, at least, where the naive run stays up at all
 
 bool is_a_good_trot(const json& run) {
   const double travel = run["travel_per_cycle_length"].get<double>() / run["clip_travel_per_cycle_length"].get<double>();
@@ -51,7 +51,7 @@ TEST(Seeds, TheTrotKeepsItsFeetOnBodiesThatDifferFromThePlan) {
   // Along the side of a hill it would hang over its lower feet and drift down, if it did not lean.
   for (const char* heading : {"0.0", "180.0"}) {
     io::write_file(directory.path / "side.toml", std::string("[ground]\nslope_deg = 8.0\nslope_heading_deg = ") + heading + "\n");
-    EXPECT_NEAR(travel_in("side.toml", 6), 0.435, 0.005);
+    EXPECT_NEAR(travel_in("side.toml", 12), 0.435, 0.005);
   }
 }
 

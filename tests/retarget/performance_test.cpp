@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <memory>
 
 #include "tests/retarget/box_performer.h"
@@ -217,7 +218,13 @@ TEST(Act, AsksItsModelOnceHowToSteerAndGoesAsEachBodyDoesByItself) {
   const Replay first = act.run(heavy, pushed(0.3)), second = act.run(performer.scene, pushed(0.4));
   EXPECT_EQ(act.times_asked(), 1);
   EXPECT_EQ(first.motion.frames, Act(performer, signals).run(heavy, pushed(0.3)).motion.frames);
-  EXPECT_EQ(second.motion.frames, Act(performer, signals).run(performer.scene, pushed(0.4)).motion.frames);
+  const Act anew(performer, signals), side_by_side(performer, signals);
+  EXPECT_EQ(second.motion.frames, anew.run(performer.scene, pushed(0.4)).motion.frames);
+  EXPECT_EQ(anew.times_asked(), 1) << "it wants to know, too";
+  auto beside = std::async(std::launch::async, [&] { return side_by_side.run(heavy, pushed(0.3)); });
+  EXPECT_EQ(side_by_side.run(performer.scene, pushed(0.4)).motion.frames, second.motion.frames);
+  EXPECT_EQ(beside.get().motion.frames, first.motion.frames);
+  EXPECT_EQ(side_by_side.times_asked(), 1);
   options.corrector.effort *= 2;
   EXPECT_EQ(act.run(heavy, pushed(0.3)).motion.frames, Act(performer, signals).run(heavy, pushed(0.3)).motion.frames);
   EXPECT_EQ(act.times_asked(), 2) << "by other feedback the model goes otherwise";

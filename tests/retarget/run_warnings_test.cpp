@@ -131,7 +131,7 @@ TEST(FeedbackWarnings, TellOfATurn) {
   }
   lost.closed_loop->report.clip_travel_per_cycle_length = 0.04;
   EXPECT_EQ(feedback_warnings(lost).front(),
-            "feedback: the creature keeps its place but turns by 0.9 degrees a cycle, and strays half as far on no other gain");
+            "feedback: the creature turns by 0.9 degrees a cycle on its place, and strays half as far on no other gain");
   lost.closed_loop->report.world_rms_length = 0.06;
   lost.closed_loop->report.shape_rms_length = 0;
   EXPECT_EQ(feedback_warnings(lost).front(),

@@ -132,7 +132,9 @@ TEST(Convert, MarksACreatureThatFalls) {
   EXPECT_EQ(report_of(creature)["outcome_ok"], false);
   EXPECT_EQ(run["fell"], true);
   EXPECT_GT(run["fall_time_s"], 0);
-  EXPECT_NE(run["fall_cause"].get<std::string>().find("limb '"), std::string::npos);
+  const std::string cause = run["fall_cause"], warnings = report_of(creature)["warnings"].dump();
+  for (const char* word : {"frame ", "limb '", "limit"}) EXPECT_NE(cause.find(word), std::string::npos) << cause;
+  for (const char* word : {"rises by", "give --height 0."}) EXPECT_NE(warnings.find(word), std::string::npos) << "the mend; " << warnings;
 }
 
 TEST(Convert, KeepsTheLayersOfASignalFile) {

@@ -39,6 +39,9 @@ fs::path assets() {
   return named != nullptr ? named : HYDROSTAT_DEFAULT_ASSETS;
 }
 
+/// What takes two minutes, of which others take the parts.
+bool is_left_out_as_long() { return std::getenv("HYDROSTAT_LONG") == nullptr; }
+
 void expect_creature(const Clip& clip, const std::function<void(const fs::path&)>& look_at = {}, double least_cycles = kCycles) {
   const fs::path file = assets() / clip.file;
   if (!fs::exists(file)) GTEST_SKIP() << "left out: " << file << " is missing (set HYDROSTAT_ASSETS)";
@@ -104,6 +107,7 @@ TEST(ThirdPartyClips, TheSnakeWindsAndKeepsItsWay) {
 
 /// As it is drawn it tips over the strip of belly that it stands on.
 TEST(ThirdPartyClips, TheSnakeRaisesItsHeadOverASpreadLoad) {
+  if (is_left_out_as_long()) GTEST_SKIP() << "left out: it takes two minutes (set HYDROSTAT_LONG)";
   const auto look_at = [](const fs::path& creature) {
     const json report = report_of(creature), run = report["replay"]["closed_loop"];
     EXPECT_NE(report["warnings"].dump().find("spreads its load"), std::string::npos) << report["warnings"];
@@ -147,6 +151,7 @@ TEST(ThirdPartyClips, TheFrogHopsItsWay) {
 
 /// Legs of so few cells that are bound folded, and that the clip stretches: from the rest lengths of its bind pose it makes a quarter of its way.
 TEST(ThirdPartyClips, TheFrogHopsOnACoarseMeshFromRestLengthsThatItsLegsCanBeStretchedFrom) {
+  if (is_left_out_as_long()) GTEST_SKIP() << "left out: it takes two minutes (set HYDROSTAT_LONG)";
   const fs::path file = assets() / "fbx/frog.fbx";
   if (!fs::exists(file)) GTEST_SKIP() << "left out: " << file << " is missing (set HYDROSTAT_ASSETS)";
   const TemporaryDirectory directory;
@@ -161,21 +166,6 @@ TEST(ThirdPartyClips, TheFrogHopsOnACoarseMeshFromRestLengthsThatItsLegsCanBeStr
   const std::string motion = io::read_file(creature / "replay.glb");
   EXPECT_EQ(hydrostat_in(directory.path, "replay creature --quiet").exit_code, 0);
   EXPECT_EQ(io::read_file(creature / "replay.glb"), motion);
-}
-
-TEST(ThirdPartyClips, TheFrogThatCannotHopSaysWhatStopsIt) {
-  const fs::path file = assets() / "fbx/frog.fbx";
-  if (!fs::exists(file)) GTEST_SKIP() << "left out: " << file << " is missing (set HYDROSTAT_ASSETS)";
-  const TemporaryDirectory directory;
-  const Outcome outcome = hydrostat_in(directory.path, "convert " + in_quotes(file) + " -o creature --quiet --clip Frog_Jump --nodes 170");
-  EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
-  const json report = report_of(directory.path / "creature");
-  const std::string cause = report["replay"]["closed_loop"]["fall_cause"], warnings = report["warnings"].dump();
-  EXPECT_NE(cause.find("frame "), std::string::npos) << cause;
-  EXPECT_NE(cause.find("limb '"), std::string::npos) << cause;
-  EXPECT_NE(cause.find("limit"), std::string::npos) << cause;
-  EXPECT_NE(warnings.find("rises by"), std::string::npos) << warnings;
-  EXPECT_NE(warnings.find("give --height 0."), std::string::npos) << "the mend; " << warnings;
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "io/clip_range.h"
 #include "retarget/contacts.h"
 #include "retarget/error.h"
+#include "retarget/gravity.h"
 
 namespace hydrostat::io {
 namespace {
@@ -150,7 +151,7 @@ void close_gaps(std::vector<bool>& on, bool what, std::size_t least) {
 
 std::vector<ContactInfo> contacts_of(const Rig& rig, const LowPoints& low, double length, double range_s) {
   const double ground = ground_of(low);
-  const double fast = std::max(kFast * rms_speed(low), kLeastFast * std::sqrt(9.81 * length));
+  const double fast = std::max(kFast * rms_speed(low), kLeastFast * std::sqrt(retarget::kGravity * length));
   const auto count = static_cast<std::size_t>(low.height.cols());
   const double step_s = range_s / static_cast<double>(count - 1);
   const auto least = std::min<std::size_t>(static_cast<std::size_t>(kShortestContact / step_s), count / 20);

@@ -14,7 +14,7 @@ namespace hydrostat::retarget {
 class ModelAnswers {
  public:
   struct Answered {
-    ReturnMap::Answers errors;
+    ReturnMap::Answers errors;  // [rad], [m], [m], as ReturnMap::learn takes them
     double seconds = 0;  // of a processor, that another run spent on them; 0 for who asked
   };
 

@@ -113,6 +113,7 @@ std::array<Replay, 2> run_pair(const std::array<std::size_t, 2>& which, const Ac
   return {beside.get(), std::move(second)};
 }
 
+/// Sets in `lost` which of these two are.
 void find_lost(const std::array<std::size_t, 2>& which, const Act& act, const PerformOptions& options, Lost& lost) {
   const std::array<Replay, 2> runs = run_pair(which, act, options);
   for (std::size_t k = 0; k < runs.size(); ++k) lost[which[k]] = is_lost(act.performer(), options, runs[k]);

@@ -262,6 +262,20 @@ TEST(Convert, MakesCreaturesOfFiniteElementsThatReplayAsTheyWere) {
   }
 }
 
+/// A dog of fifteen centimetres, whose leap as it is drawn no feedback lands.
+TEST(Convert, SpreadsTheLoadOfWhatWouldFallAndRemembersIt) {
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "creature";
+  ASSERT_EQ(convert(directory.path, "boxdog_jump.glb", "creature", std::string(kSmallOptions) + "--height 0.15").exit_code, 0);
+  const json report = report_of(creature);
+  EXPECT_FALSE(report["replay"]["closed_loop"]["fell"]);
+  EXPECT_NE(report["warnings"].dump().find("spreads its load"), std::string::npos) << report["warnings"];
+  EXPECT_NE(io::read_file(creature / "creature.toml").find("load = 'spread'"), std::string::npos);
+  const std::string motion = motion_bytes(creature);
+  EXPECT_EQ(hydrostat_in(directory.path, "replay creature --quiet").exit_code, 0);
+  EXPECT_EQ(motion_bytes(creature), motion);
+}
+
 /// Small errors of short windows add up: what keeps within them has to keep its feet too, where the finest setting does.
 TEST(Convert, TakesTheCheapestWithinAnErrorKeepsItsFeetAndReplaysByIt) {
   const TemporaryDirectory directory;

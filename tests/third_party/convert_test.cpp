@@ -39,7 +39,7 @@ fs::path assets() {
   return named != nullptr ? named : HYDROSTAT_DEFAULT_ASSETS;
 }
 
-/// What takes two minutes, of which others take the parts.
+/// Two of two minutes each. Convert::SpreadsTheLoad... does on a sample what one does; the other is the only one that is given fitted rest lengths.
 bool is_left_out_as_long() { return std::getenv("HYDROSTAT_LONG") == nullptr; }
 
 void expect_creature(const Clip& clip, const std::function<void(const fs::path&)>& look_at = {}, double least_cycles = kCycles) {

@@ -83,7 +83,8 @@ ReturnMap::ReturnMap(const PreparedTarget& plan, double length, const physics::B
     : length_(length),
       period_s_(plan.target.duration_s()),
       yaw_(plan.target.yaw),
-      least_drift_(is_dragged(plan.contacts) ? kLeastDrift : kLeastOnLegs),
+      is_dragged_(is_dragged(plan.contacts)),
+      least_drift_(is_dragged_ ? kLeastDrift : kLeastOnLegs),
       most_(kMostHandle),
       least_surprise_(kSurprise),
       is_loop_(plan.target.loop) {
@@ -134,9 +135,10 @@ void ReturnMap::learn(const Answers& errors) {
   for (const auto error : errors.colwise()) {
     if (!(per_length(error, length_).norm() < kAstray)) return;
   }
-  const WayError by_itself = errors.col(1);
+  const WayError by_itself = errors.col(1), drift = by_itself - onward_ * errors.col(0);
+  if (!is_dragged_ && per_length(drift, length_).norm() < least_drift_) return;  // the body has been pushed
   response_ = (errors.rightCols<kHandles>().colwise() - by_itself) / kTrial;
-  drift_ = by_itself - onward_ * errors.col(0);
+  drift_ = drift;
   has_learned_ = true;
   steer();
 }

@@ -41,7 +41,8 @@ class ReturnMap {
   /// The handles with which a model is to go: none for k = 0, else the k-th alone.
   static Handles trial(int k);
   /// Takes the errors of the way of a model that starts as the target does and goes for a cycle by itself (column 0), then,
-  /// each time from there, for another with trial(k) (column k + 1). What fell or diverged teaches nothing.
+  /// each time from there, for another with trial(k) (column k + 1). What fell or diverged teaches nothing, and where a model that steps
+  /// freely keeps its way there is nothing to steer: its corrector holds the way, and its body has been pushed.
   void learn(const Answers& errors);
   bool has_learned() const { return has_learned_; }
 
@@ -55,6 +56,7 @@ class ReturnMap {
 
   double length_, period_s_;
   double yaw_;          // [rad] of the target in a cycle
+  bool is_dragged_;
   double least_drift_;  // per L, a cycle
   double most_;         // of a handle
   double least_surprise_;  // per L

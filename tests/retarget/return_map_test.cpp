@@ -78,6 +78,13 @@ Plant random_plant(unsigned seed, double stride) {
 
 double length_of(const WayError& error) { return std::hypot(0.5 * error[0], error[1] / kLength, error[2] / kLength); }
 
+/// The same that drifts by so much, per L, a cycle.
+Plant drifting_plant(unsigned seed, double stride, double drift) {
+  Plant plant = random_plant(seed, stride);
+  plant.drift *= drift / length_of(plant.drift);
+  return plant;
+}
+
 TEST(ReturnMap, KeepsABodyOnItsWayThatWouldDriftFromItEvenIfItAnswersOtherwiseThanTheModel) {
   for (unsigned seed = 0; seed < 50; ++seed) {
     for (const double stride : {0.0, 0.3 * kLength}) {
@@ -206,6 +213,23 @@ TEST(ReturnMap, LearnsNothingFromAModelThatFallsAndDoesNotAskAgain) {
   }
 }
 
+TEST(ReturnMap, LegsWhoseModelKeepsItsWayWereThrownOffIt) {
+  for (const ContactState state : {ContactState::kStick, ContactState::kSlide}) {
+    for (const double drift : {0.005, 0.02}) {  // per L, a cycle of the model
+      SCOPED_TRACE("glides " + std::to_string(state == ContactState::kSlide) + ", drift " + std::to_string(drift));
+      for (unsigned seed = 0; seed < 20; ++seed) {
+        ReturnMap map(going(state), kLength, make_box_creature().scene.body);
+        map.end_cycle({0.1, 0, 0});
+        ASSERT_TRUE(map.wants_to_learn());
+        map.learn(drifting_plant(seed, 0, drift).answers());
+        EXPECT_EQ(map.handles().isZero(0), state == ContactState::kStick && drift < 0.015);
+        EXPECT_NE(map.has_learned(), map.handles().isZero(0));
+        EXPECT_FALSE(map.wants_to_learn());
+      }
+    }
+  }
+}
+
 TEST(ReturnMap, RestsForACycleAfterWhatItDidNotForesee) {
   ReturnMap map(going(ContactState::kSlide), kLength, make_box_creature().scene.body);
   Plant plant = random_plant(3, 0);
@@ -228,7 +252,7 @@ TEST(ReturnMap, WhatLeapsMayLandFartherFromWhereItWasForeseen) {
     SCOPED_TRACE("leaps " + std::to_string(leaps));
     const PreparedTarget plan = striding(leaps);
     ReturnMap map(plan, kLength, make_box_creature().scene.body);
-    Plant plant = random_plant(3, 2 * kLength);
+    Plant plant = drifting_plant(3, 2 * kLength, 0.03);
     plant.go(map.handles(), true);
     map.end_cycle(plant.error);
     map.learn(plant.answers());
@@ -250,7 +274,7 @@ TEST(ReturnMap, BendsNothingForWhatALeapMissesAlongItsWay) {
     const PreparedTarget plan = striding(leaps);
     const auto handles_after = [&](const Eigen::Vector2d& more) {
       ReturnMap map(plan, kLength, make_box_creature().scene.body);
-      Plant plant = random_plant(3, 2 * kLength);
+      Plant plant = drifting_plant(3, 2 * kLength, 0.03);
       plant.go(map.handles(), true);
       map.end_cycle(plant.error);
       map.learn(plant.answers());

@@ -22,7 +22,7 @@ struct CorrectorOptions {
   double foot_settle_s = 0.1;   // tau of a foot in the air
   double step = 1;              // share of the error of the centre of mass that a foot in the air makes its own
   double clearance = 0.03;      // of L: over what a foot in the air is to step onto or across
-  double step_ahead = 1.5;      // of sqrt(h / g): how far ahead of its error the centre of mass is met
+  double step_ahead = 1.75;     // of sqrt(h / g): how far ahead of its error the centre of mass is met
   double long_step = 0.15;      // of h: what is longer is stepped at once, whatever the plan; infinite: never
   int response_every = 4;       // calls for which the muscles' response is kept while the error is below calm_error
   RegulatorOptions regulator;   // that takes the place of all that but the cones, within its reach

@@ -37,6 +37,7 @@ struct ToldPath {
 void name_told_path(RecordArchive& archive, ToldPath& told) { name_path(archive, told.path, told.report); }
 
 void name_trials(RecordArchive& archive, const std::string& name, retarget::TrialsOutcome& trials) {
+  archive.exchange(name + "/bodies", trials.bodies);
   archive.exchange(name + "/lost", trials.lost);
   archive.exchange(name + "/shape", trials.shape_rms_length);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <future>
 #include <memory>
+#include <numbers>
 #include <numeric>
 #include <random>
 
@@ -76,7 +77,7 @@ bool is_as_planned(const Performer& performer, const ReplayOptions& options) {
   return is_level && !performer.world.is_told() && performer.scene.obstacles.empty() && options.pushes.empty();
 }
 
-/// One of kTrials, by the options' feedback.
+/// A body on trial, by the options' feedback.
 Replay run_trial(const Trial& trial, const Act& act, const PerformOptions& options) {
   ReplayOptions shoved = options.replay;
   shoved.correct = true;
@@ -105,17 +106,17 @@ using Lost = std::array<bool, kTrials.size()>;
 
 int count(const Lost& lost) { return static_cast<int>(std::count(lost.begin(), lost.end(), true)); }
 
-/// Two of kTrials, side by side.
-std::array<Replay, 2> run_pair(const std::array<std::size_t, 2>& which, const Act& act, const PerformOptions& options) {
-  const auto go = [&](std::size_t k) { return run_trial(kTrials[k], act, options); };
-  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, which[0]);
-  Replay second = go(which[1]);
+/// Two bodies, side by side.
+std::array<Replay, 2> run_pair(const std::array<Trial, 2>& trials, const Act& act, const PerformOptions& options) {
+  const auto go = [&](const Trial& trial) { return run_trial(trial, act, options); };
+  auto beside = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, go, trials[0]);
+  Replay second = go(trials[1]);
   return {beside.get(), std::move(second)};
 }
 
 /// Sets in `lost` which of these two are.
 void find_lost(const std::array<std::size_t, 2>& which, const Act& act, const PerformOptions& options, Lost& lost) {
-  const std::array<Replay, 2> runs = run_pair(which, act, options);
+  const std::array<Replay, 2> runs = run_pair({kTrials[which[0]], kTrials[which[1]]}, act, options);
   for (std::size_t k = 0; k < runs.size(); ++k) lost[which[k]] = is_lost(act.performer(), options, runs[k]);
 }
 
@@ -193,6 +194,14 @@ Variation variation_of(unsigned seed, double most) {
   return variation;
 }
 
+std::vector<Trial> drawn_trials(int count, unsigned first_seed) {
+  std::vector<Trial> trials;
+  for (int k = 0; k < count; ++k) {
+    trials.push_back({variation_of(first_seed + static_cast<unsigned>(k), kTrialVariation), 2 * std::numbers::pi * (k + 0.5) / count});
+  }
+  return trials;
+}
+
 physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation) {
   physics::Scene varied = scene;
   varied.body.mass *= variation.mass;
@@ -256,20 +265,20 @@ Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const R
   return lapse_of(straying(performer, options, run));
 }
 
-TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options) {
-  static_assert(kTrials.size() % 2 == 0, "they go in pairs");
+TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options, std::span<const Trial> trials) {
   TrialsOutcome result;
-  for (std::size_t first = 0; first < kTrials.size(); first += 2) {
-    for (const Replay& run : run_pair({first, first + 1}, act, options)) {
+  result.bodies = static_cast<int>(trials.size());
+  for (std::size_t first = 0; first + 1 < trials.size(); first += 2) {
+    for (const Replay& run : run_pair({trials[first], trials[first + 1]}, act, options)) {
       if (is_lost(act.performer(), options, run)) ++result.lost;
-      result.shape_rms_length += run.report.shape_rms_length / static_cast<double>(kTrials.size());
+      result.shape_rms_length += run.report.shape_rms_length / result.bodies;
     }
   }
   return result;
 }
 
-TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options) {
-  return go_on_trials(Act(performer, signals), options);
+TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options, std::span<const Trial> trials) {
+  return go_on_trials(Act(performer, signals), options, trials);
 }
 
 Performances perform_steadily(const Act& act, const PerformOptions& options) {

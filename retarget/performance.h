@@ -3,6 +3,8 @@
 #include <array>
 #include <numbers>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "retarget/control_mesh.h"
 #include "retarget/cost_source.h"
@@ -115,6 +117,10 @@ inline constexpr std::array<Trial, 4> kTrials{{{{1 + kTrialVariation, 1 - kTrial
                                                {{1 - kTrialVariation, 1 - kTrialVariation, 1 + kTrialVariation}, std::numbers::pi},
                                                {{1 - kTrialVariation, 1 + kTrialVariation, 1 + kTrialVariation}, 3 * std::numbers::pi / 2}}};
 
+/// Bodies from between those corners, each drawn by its number (variation_of) from `first_seed` on and shoved from a side of its own; the
+/// sides lie evenly around. What is lost within half of all bodies may be lost at no corner.
+std::vector<Trial> drawn_trials(int count, unsigned first_seed = 1001);
+
 /// The scene with another body of the same shape.
 physics::Scene varied_scene(const physics::Scene& scene, const Variation& variation);
 
@@ -140,14 +146,16 @@ constexpr double kBetter = 0.5;  // share of the straying that anything but the 
 /// undisturbed, without scene or push, there is a way to lose, and after a cycle at least.
 Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const Replay& run);
 
-/// What became of kTrials.
+/// What became of bodies on trial.
 struct TrialsOutcome {
+  int bodies = 0;
   int lost = 0;                 // that fell or diverged, lost the way of their loop (lapse_of), or ended a single run over 5 % of L off its place
   double shape_rms_length = 0;  // as in ReplayReport, the mean of all, as long as they went
 };
-/// Lets kTrials go by the options' feedback, as long as the options have it.
-TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options);
-TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options);
+/// Lets an even number of bodies go by the options' feedback, as long as the options have it.
+TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options, std::span<const Trial> trials = kTrials);
+TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options,
+                           std::span<const Trial> trials = kTrials);
 
 /// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, where the options
 /// are thorough a regulator, such as looks less far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times

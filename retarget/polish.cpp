@@ -177,8 +177,11 @@ Polished polish(const Performer& performer, const SignalSet& signals, const Perf
   trials.replay.trace = false;
   SignalSet without_layers = signals;
   without_layers.layers.clear();
-  result.solved_on_trials = go_on_trials(performer, without_layers, trials);
-  result.polished_on_trials = go_on_trials(best.performer, best.signals, trials);
+  std::vector<Trial> bodies(kTrials.begin(), kTrials.end());
+  const std::vector<Trial> drawn = drawn_trials(polish.drawn_bodies);
+  bodies.insert(bodies.end(), drawn.begin(), drawn.end());
+  result.solved_on_trials = go_on_trials(performer, without_layers, trials, bodies);
+  result.polished_on_trials = go_on_trials(best.performer, best.signals, trials, bodies);
   const double most_on_trials = polish.most_on_trials * result.solved_on_trials.shape_rms_length + polish.most_shape;
   result.is_frail = result.polished_on_trials.lost > result.solved_on_trials.lost || !(result.polished_on_trials.shape_rms_length <= most_on_trials);
   if (result.is_frail) return result;

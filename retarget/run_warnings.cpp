@@ -156,9 +156,9 @@ std::vector<std::string> motion_warnings(const SimulationReport& run) {
 std::vector<std::string> polish_warnings(const Polished& polished) {
   if (!polished.is_frail) return {};
   const TrialsOutcome &without = polished.solved_on_trials, &with = polished.polished_on_trials;
-  return {sentence("polish: left out, for bodies off the plan lose by it: of %d that are by %.0f %%, shoved by %.1f m/s, it loses %d instead of %d, and "
+  return {sentence("polish: left out, for bodies off the plan lose by it: of %d that are by up to %.0f %%, shoved by %.1f m/s, it loses %d instead of %d, and "
                    "they go by %.2f %% L from the target instead of %.2f",
-                   static_cast<int>(kTrials.size()), 100 * kTrialVariation, kTrialShove, with.lost, without.lost, 100 * with.shape_rms_length,
+                   with.bodies, 100 * kTrialVariation, kTrialShove, with.lost, without.lost, 100 * with.shape_rms_length,
                    100 * without.shape_rms_length)};
 }
 

@@ -52,14 +52,15 @@ TEST(PathFile, KeepsWhatPolishLearnedForTheCache) {
   made.signals.activation.sine = Eigen::MatrixXd::Random(3, 4);
   made.signals.activation.cubic = Eigen::MatrixXd(0, 4);
   made.signals.force = made.signals.activation;
-  made.solved_on_trials = {1, 0.01};
-  made.polished_on_trials = {3, 0.02};
+  made.solved_on_trials = {4, 1, 0.01};
+  made.polished_on_trials = {4, 3, 0.02};
   made.is_frail = true;
   const auto back = result_of<retarget::Polished>(record_of(made));
   EXPECT_EQ(back.signals.activation.cosine, made.signals.activation.cosine);
   EXPECT_EQ(back.signals.force.sine, made.signals.force.sine);
   EXPECT_EQ(back.path.place.frames, made.path.place.frames);
   EXPECT_TRUE(back.is_better());
+  EXPECT_EQ(back.solved_on_trials.bodies, 4);
   EXPECT_EQ(back.solved_on_trials.lost, 1);
   EXPECT_EQ(back.polished_on_trials.shape_rms_length, 0.02);
   EXPECT_TRUE(back.is_frail);

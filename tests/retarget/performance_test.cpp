@@ -6,6 +6,8 @@
 #include <cmath>
 #include <future>
 #include <memory>
+#include <numbers>
+#include <set>
 
 #include "tests/retarget/box_performer.h"
 
@@ -268,6 +270,30 @@ TEST(PerformSteadily, TakesTheFirstGainThatStaysUpWhereItIsNotThorough) {
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
   EXPECT_EQ(steady.feedback, *std::find_if_not(kInTurn.begin(), kInTurn.end(), is_passed));
   EXPECT_EQ(steady.trials_lost, 0);
+}
+
+/// What is drawn lies between the corners, on no line between two of them, and is shoved from where none of them is.
+TEST(DrawnTrials, LieBetweenTheCornersAndAreShovedFromSidesOfTheirOwn) {
+  const auto sides_apart = [](const Trial& a, const Trial& b) { return std::abs(std::remainder(a.angle - b.angle, 2 * std::numbers::pi)); };
+  for (const int count : {2, 4, 8, 12}) {
+    SCOPED_TRACE(count);
+    const std::vector<Trial> drawn = drawn_trials(count), others = drawn_trials(count, 7);
+    ASSERT_EQ(drawn.size(), static_cast<std::size_t>(count));
+    std::set<double> seen;
+    for (std::size_t k = 0; k < drawn.size(); ++k) {
+      for (const double factor : {drawn[k].body.mass, drawn[k].body.friction, drawn[k].body.stiffness}) {
+        EXPECT_LT(std::abs(factor - 1), kTrialVariation);
+        EXPECT_TRUE(seen.insert(factor).second) << "twice the same";
+      }
+      EXPECT_EQ(drawn[k].body.mass, drawn_trials(count)[k].body.mass);
+      EXPECT_NE(drawn[k].body.mass, others[k].body.mass);
+      for (std::size_t other = 0; other < k; ++other) EXPECT_GT(sides_apart(drawn[k], drawn[other]), 0.99 * 2 * std::numbers::pi / count);
+      if (count % 4 == 0) {
+        for (const Trial& corner : kTrials) EXPECT_GT(sides_apart(drawn[k], corner), 0.99 * std::numbers::pi / count);
+      }
+    }
+  }
+  EXPECT_TRUE(drawn_trials(0).empty());
 }
 
 /// A box that nothing disturbs stands on whatever body; by feedback that knows too late none of them does.

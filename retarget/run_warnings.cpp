@@ -162,4 +162,14 @@ std::vector<std::string> polish_warnings(const Polished& polished) {
                    100 * without.shape_rms_length)};
 }
 
+std::vector<std::string> polished_replay_warnings(const Replay& before, const Replay& after, bool is_as_planned) {
+  if (after.report.fell) return {sentence("polish: left out, for by it the creature falls at %.1f s", after.report.fall_time_s)};
+  if (after.termination == physics::Termination::kDiverged) {
+    return {sentence("polish: left out, for by it the simulation diverges at %.1f s", after.report.duration_s)};
+  }
+  if (!is_as_planned || after.report.correction_rms < before.report.correction_rms) return {};
+  return {sentence("polish: left out, for over the whole replay the corrector has more to do by it (%.2g instead of %.2g, RMS)", after.report.correction_rms,
+                   before.report.correction_rms)};
+}
+
 }  // namespace hydrostat::retarget

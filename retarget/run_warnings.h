@@ -37,5 +37,8 @@ std::vector<std::string> motion_warnings(const SimulationReport& run);
 
 /// Of polished signals that were left out, for they cost bodies off the plan their balance.
 std::vector<std::string> polish_warnings(const Polished& polished);
+/// What the whole replay by polished signals says against them beside the one before; none where they are to be kept. How much is corrected
+/// tells something only of what goes as it was planned: nothing pushes it, and the body is no other.
+std::vector<std::string> polished_replay_warnings(const Replay& before, const Replay& after, bool is_as_planned);
 
 }  // namespace hydrostat::retarget

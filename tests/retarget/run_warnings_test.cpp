@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/retarget/box_performer.h"
 
@@ -171,6 +172,29 @@ TEST(MotionWarnings, TellOfWhatCarriedTheCreatureAndOfAStrangeShape) {
   EXPECT_EQ(motion_warnings(run)[0].find("the skin is 12 % L from the clip's"), 0U) << motion_warnings(run)[0];
   run.fell = true;
   EXPECT_TRUE(motion_warnings(run).empty());
+}
+
+/// Whether it falls, cannot be told or corrects more; but not of how much where that is for a push or another body.
+TEST(PolishedReplayWarnings, AreOfWhatGoesWorseByPolishThanWithout) {
+  Replay before, after;
+  before.report.correction_rms = 4e-4;
+  after.report.correction_rms = 3.9e-4;
+  EXPECT_TRUE(polished_replay_warnings(before, after, true).empty());
+  for (const double correction : {4e-4, 8e-4, std::numeric_limits<double>::quiet_NaN()}) {
+    after.report.correction_rms = correction;
+    ASSERT_EQ(polished_replay_warnings(before, after, true).size(), 1u) << correction;
+    EXPECT_TRUE(polished_replay_warnings(before, after, false).empty()) << correction;
+  }
+  after.report.correction_rms = 8e-4;
+  EXPECT_NE(polished_replay_warnings(before, after, true)[0].find("0.0008 instead of 0.0004"), std::string::npos);
+  after.report.correction_rms = 1e-5;
+  after.report.fell = true;
+  after.report.fall_time_s = 3.25;
+  for (const bool is_as_planned : {true, false}) EXPECT_NE(polished_replay_warnings(before, after, is_as_planned).at(0).find("falls at 3.2 s"), std::string::npos);
+  after.report.fell = false;
+  after.termination = physics::Termination::kDiverged;
+  after.report.duration_s = 0.5;
+  for (const bool is_as_planned : {true, false}) EXPECT_NE(polished_replay_warnings(before, after, is_as_planned).at(0).find("diverges at 0.5 s"), std::string::npos);
 }
 
 TEST(MotionWarnings, TellOfWhatCarriedTheBodyOfAScene) {

@@ -297,7 +297,7 @@ retarget::PerformOptions Conversion::perform_options() const {
 void Conversion::perform(const std::string& stage, const retarget::Feedback& feedback) {
   retarget::PerformOptions options = perform_options();
   options.feedback = feedback;
-  key_ = key_after(key_, "heavy bodies on trial", signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
+  key_ = key_after(key_, "bodies on trial", signals_text_, physics::name_of(options.replay.method), std::int64_t{options_.seed});
   if (chosen_) key_ = key_after(key_, options.replay.step_s);
   performances_ = stages_.run(stage, key_, [&] { return retarget::perform_steadily(performer(), signals_, options); });
 }

@@ -130,15 +130,14 @@ Lost lost_on_trials(const Act& act, const PerformOptions& options, const Lost& b
   return lost;
 }
 
-/// Where the planned body keeps its way and heavy ones, which of our clips are lost first, do not: the regulator on which fewest of
-/// kTrials are lost, if those are fewer.
+/// Where the planned body keeps its way and some of kTrials do not: the regulator on which fewest of them are lost, if those are fewer.
 void keep_more_bodies(const Act& act, const PerformOptions& options, Performances& result) {
   PerformOptions on_trial = options, other = options;
   on_trial.replay.duration_s = std::min(options.replay.duration_s, kLookSeconds);
   other.baselines = false;
   Lost least{};
   find_lost({0, 1}, act, on_trial, least);
-  if (count(least) > 0) find_lost({2, 3}, act, on_trial, least);
+  find_lost({2, 3}, act, on_trial, least);
   for (const Feedback& feedback : kOthers) {
     if (feedback.regulator == 0 || feedback == options.feedback) continue;  // others are for feet that the usual gain shakes loose
     if (count(least) == 0) break;

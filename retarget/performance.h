@@ -160,7 +160,7 @@ TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals,
 /// The same as perform, on other feedback where the closed loop falls or loses its way on what was wished: the usual, where the options
 /// are thorough a regulator, such as looks less far ahead and holds on to momentum, and such as spares the muscles 4, 16, then 64 times
 /// as much. The first that does neither counts; where the options are thorough, the first on which none of kTrials is lost either, or else
-/// that on which fewest are, and where the body keeps its way on what was wished but heavy ones of kTrials do not, the regulators are tried
+/// that on which fewest are, and where the body keeps its way on what was wished but some of kTrials do not, the regulators are tried
 /// likewise. Where none keeps the body on its way, what stays up and strays least, the earlier one unless a later
 /// strays less than half as far. On some bodies, coarse ones above all, a gain that others need shakes the feet loose.
 Performances perform_steadily(const Act& act, const PerformOptions& options);

@@ -8,6 +8,7 @@
 #include <memory>
 #include <numbers>
 #include <set>
+#include <span>
 
 #include "tests/retarget/box_performer.h"
 
@@ -159,6 +160,24 @@ TEST(PerformSteadily, TakesARegulatorWhereThePlannedBodyIsWellAndThoseOffThePlan
   EXPECT_EQ(steady.lapse, Lapse::kNothing);
   EXPECT_TRUE(steady.naive && steady.open_loop);
   EXPECT_TRUE(steady.main().motion.frames == perform_by(steady.feedback, performer, signals, options).main().motion.frames);
+}
+
+/// What sees late and acts at once on all that it sees shakes down light and stiff bodies, on which it has most of a hold, and no heavy ones.
+TEST(PerformSteadily, TakesAnotherRegulatorWhereLightBodiesAloneAreLost) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  PerformOptions options = lasting(1);
+  options.is_thorough = true;
+  options.replay.observation.delay_s = 0.02;
+  options.feedback.regulator = 1;
+  ASSERT_FALSE(is_lost_by(options.feedback, performer, signals, options));
+  ASSERT_EQ(go_on_trials(performer, signals, options, std::span(kTrials).first(2)).lost, 0);
+  ASSERT_EQ(go_on_trials(performer, signals, options, std::span(kTrials).last(2)).lost, 2);
+  const Performances steady = perform_steadily(performer, signals, options);
+  EXPECT_NE(steady.feedback, options.feedback);
+  EXPECT_EQ(steady.trials_lost, 0);
+  options.feedback = steady.feedback;
+  EXPECT_EQ(go_on_trials(performer, signals, options).lost, 0);
 }
 
 /// A run by the performer's signals that knows of no other.

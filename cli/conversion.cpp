@@ -310,7 +310,7 @@ void Conversion::follow(const retarget::NominalPath& path) {
 void Conversion::polish() {
   retarget::PerformOptions plan = perform_options();
   plan.seed = 0;
-  key_ = key_after(key_, "polish with twelve trials");
+  key_ = key_after(key_, "polish with trials, then drawn ones");
   const retarget::Polished polished =
       stages_.run("polish", key_, [&] { return retarget::polish(target_.performer, signals_, plan); });  // outside a scene
   add_warnings(retarget::polish_warnings(polished));

@@ -177,14 +177,14 @@ Polished polish(const Performer& performer, const SignalSet& signals, const Perf
   trials.replay.trace = false;
   SignalSet without_layers = signals;
   without_layers.layers.clear();
-  std::vector<Trial> bodies(kTrials.begin(), kTrials.end());
   const std::vector<Trial> drawn = drawn_trials(polish.drawn_bodies);
-  bodies.insert(bodies.end(), drawn.begin(), drawn.end());
-  result.solved_on_trials = go_on_trials(performer, without_layers, trials, bodies);
-  result.polished_on_trials = go_on_trials(best.performer, best.signals, trials, bodies);
-  const double most_on_trials = polish.most_on_trials * result.solved_on_trials.shape_rms_length + polish.most_shape;
-  result.is_frail = result.polished_on_trials.lost > result.solved_on_trials.lost || !(result.polished_on_trials.shape_rms_length <= most_on_trials);
-  if (result.is_frail) return result;
+  for (const std::span<const Trial> bodies : {std::span<const Trial>(kTrials), std::span<const Trial>(drawn)}) {
+    result.solved_on_trials = go_on_trials(performer, without_layers, trials, bodies);
+    result.polished_on_trials = go_on_trials(best.performer, best.signals, trials, bodies);
+    const double most_shape_of_all = polish.most_on_trials * result.solved_on_trials.shape_rms_length + polish.most_shape;
+    result.is_frail = result.polished_on_trials.lost > result.solved_on_trials.lost || !(result.polished_on_trials.shape_rms_length <= most_shape_of_all);
+    if (result.is_frail) return result;
+  }
   report.correction_rms_after = best.report.correction_rms;
   SignalSet learned = std::move(best.signals);
   carry_forces(performer, signals, performer.path, learned, best.performer.path);

@@ -113,14 +113,19 @@ function polish_row(directory) {
     creature: basename(directory), correction_before: round(off.replay.closed_loop.correction_rms), correction_after: round(on.replay.closed_loop.correction_rms),
     open_loop_s_before: before_s, falls_before, open_loop_s_after: after_s, falls_after,
     shape_before: round(off.replay.closed_loop.shape_rms_length), shape_after: round(on.replay.closed_loop.shape_rms_length),
+    is_left_out: on.polish ? 0 : 1,
   };
 }
 function polish_table(rows) {
   const named = (creature) => creature.replace(/^\S+/, '`$&`').replace(/ (.+)/, ' `$1`');
   const lasted = (seconds, falls) => `${short(Number(seconds), 2)} s${Number(falls) ? '' : ' (all)'}`;
   return markdown(['`--polish on`', 'correction before', 'after', 'open loop stays up, before', 'after', 'shape before, % L', 'after'],
-    rows.map((row) => [named(row.creature), plain(row.correction_before), plain(row.correction_after), lasted(row.open_loop_s_before, row.falls_before),
-      lasted(row.open_loop_s_after, row.falls_after), (100 * row.shape_before).toFixed(2), (100 * row.shape_after).toFixed(2)]));
+    rows.map((row) => {
+      const after = (value) => (Number(row.is_left_out) ? '-' : value);
+      return [named(row.creature), plain(row.correction_before), Number(row.is_left_out) ? 'left out' : plain(row.correction_after),
+        lasted(row.open_loop_s_before, row.falls_before), after(lasted(row.open_loop_s_after, row.falls_after)),
+        (100 * row.shape_before).toFixed(2), after((100 * row.shape_after).toFixed(2))];
+    }));
 }
 
 /** The Young's modulus from which on implicit is cheaper, between the two measured ones where the ratio of the times passes 1. */
@@ -158,7 +163,7 @@ const kinds = {
   },
   polish: {
     columns: ['creature', 'correction_before', 'correction_after', 'open_loop_s_before', 'falls_before', 'open_loop_s_after', 'falls_after',
-      'shape_before', 'shape_after'],
+      'shape_before', 'shape_after', 'is_left_out'],
     read: (directories) => directories.map(polish_row), key: (row) => row.creature, table: polish_table,
   },
   peers: {

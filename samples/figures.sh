@@ -96,6 +96,7 @@ run_polish() {
   polish worm_crawl "$project/samples/worm_crawl.glb"
   polish boxdog_trot "$project/samples/boxdog_trot.fbx"
   polish 'boxdog_trot --nodes 50' "$project/samples/boxdog_trot.fbx" --nodes 50
+  polish boxdog_jump "$project/samples/boxdog_jump.glb"
   polish 'fox --height 0.6' "$assets/gltf/fox.glb" --clip Walk --height 0.6
   polish frog "$assets/fbx/frog.fbx" --clip Frog_Jump --height 0.15
   polish snake "$assets/gltf/snake.glb" --clip 'Side winding'

@@ -322,7 +322,7 @@ void Conversion::polish() {
   follow(polished.path);
   signals_text_ = io::signals_text(signals_);
   perform("polished_replay", before.feedback);
-  const auto lapses = retarget::polished_replay_warnings(before.main(), performances_.main(), !in_scene_ && options_.seed == 0);
+  const auto lapses = retarget::polished_replay_warnings(before, performances_, !in_scene_ && options_.seed == 0);
   add_warnings(lapses);
   if (!lapses.empty()) {
     signals_ = solved;

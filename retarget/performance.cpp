@@ -267,12 +267,14 @@ Lapse lapse_of(const Performer& performer, const ReplayOptions& options, const R
 TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options, std::span<const Trial> trials) {
   TrialsOutcome result;
   result.bodies = static_cast<int>(trials.size());
+  const auto take = [&](const Replay& run) {
+    if (is_lost(act.performer(), options, run)) ++result.lost;
+    result.shape_rms_length += run.report.shape_rms_length / result.bodies;
+  };
   for (std::size_t first = 0; first + 1 < trials.size(); first += 2) {
-    for (const Replay& run : run_pair({trials[first], trials[first + 1]}, act, options)) {
-      if (is_lost(act.performer(), options, run)) ++result.lost;
-      result.shape_rms_length += run.report.shape_rms_length / result.bodies;
-    }
+    for (const Replay& run : run_pair({trials[first], trials[first + 1]}, act, options)) take(run);
   }
+  if (trials.size() % 2 == 1) take(run_trial(trials.back(), act, options));
   return result;
 }
 

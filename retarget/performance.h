@@ -117,8 +117,8 @@ inline constexpr std::array<Trial, 4> kTrials{{{{1 + kTrialVariation, 1 - kTrial
                                                {{1 - kTrialVariation, 1 - kTrialVariation, 1 + kTrialVariation}, std::numbers::pi},
                                                {{1 - kTrialVariation, 1 + kTrialVariation, 1 + kTrialVariation}, 3 * std::numbers::pi / 2}}};
 
-/// Bodies from between those corners, each drawn by its number (variation_of) from `first_seed` on and shoved from a side of its own; the
-/// sides lie evenly around. What is lost within half of all bodies may be lost at no corner.
+/// Bodies from all within those bounds, each drawn by its number (variation_of) from `first_seed` on, shoved from sides that lie evenly around:
+/// bodies in the midst may be lost where none at a corner is.
 std::vector<Trial> drawn_trials(int count, unsigned first_seed = 1001);
 
 /// The scene with another body of the same shape.
@@ -152,7 +152,7 @@ struct TrialsOutcome {
   int lost = 0;                 // that fell or diverged, lost the way of their loop (lapse_of), or ended a single run over 5 % of L off its place
   double shape_rms_length = 0;  // as in ReplayReport, the mean of all, as long as they went
 };
-/// Lets an even number of bodies go by the options' feedback, as long as the options have it.
+/// Lets bodies go by the options' feedback, as long as the options have it.
 TrialsOutcome go_on_trials(const Act& act, const PerformOptions& options, std::span<const Trial> trials = kTrials);
 TrialsOutcome go_on_trials(const Performer& performer, const SignalSet& signals, const PerformOptions& options,
                            std::span<const Trial> trials = kTrials);

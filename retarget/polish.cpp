@@ -177,10 +177,11 @@ Polished polish(const Performer& performer, const SignalSet& signals, const Perf
   trials.replay.trace = false;
   SignalSet without_layers = signals;
   without_layers.layers.clear();
-  const std::vector<Trial> drawn = drawn_trials(polish.drawn_bodies);
-  for (const std::span<const Trial> bodies : {std::span<const Trial>(kTrials), std::span<const Trial>(drawn)}) {
-    result.solved_on_trials = go_on_trials(performer, without_layers, trials, bodies);
-    result.polished_on_trials = go_on_trials(best.performer, best.signals, trials, bodies);
+  const Act solved(performer, without_layers), polished(best.performer, best.signals);
+  for (const std::span<const Trial> bodies : {std::span<const Trial>(kTrials), std::span<const Trial>(polish.more_trials)}) {
+    if (bodies.empty()) continue;
+    result.solved_on_trials = go_on_trials(solved, trials, bodies);
+    result.polished_on_trials = go_on_trials(polished, trials, bodies);
     const double most_shape_of_all = polish.most_on_trials * result.solved_on_trials.shape_rms_length + polish.most_shape;
     result.is_frail = result.polished_on_trials.lost > result.solved_on_trials.lost || !(result.polished_on_trials.shape_rms_length <= most_shape_of_all);
     if (result.is_frail) return result;

@@ -13,7 +13,7 @@ struct PolishOptions {
   double least_fall = 0.1;       // share by which a round must bring the correction down to be followed by another
   double enough = 1e-3;          // share of the correction at the start that is as good as none
   double most_shape = 1e-3;      // per L, by which the shape may go further from the target
-  int drawn_bodies = 8;          // off the plan, an even number, that go on trial where kTrials have nothing against it
+  std::vector<Trial> more_trials = drawn_trials(8);  // bodies that go on trial where kTrials have nothing against it
   double most_on_trials = 1.25;  // factor by which, beside `most_shape`, the shape may go further from the target on these
 };
 
@@ -22,8 +22,8 @@ struct Polished {
   SignalSet signals;
   NominalPath path;
   PolishReport report;  // the open loop is not looked at
-  TrialsOutcome solved_on_trials, polished_on_trials;  // of what helps the planned body; of kTrials where these decided, else of the drawn
-  bool is_frail = false;  // whether that costs others their balance, and was left out
+  TrialsOutcome solved_on_trials, polished_on_trials;  // of what helps the planned body; of kTrials where these decided, else of more_trials
+  bool is_frail = false;  // whether others are lost or stray by it, so that it was left out
   bool is_better() const { return report.correction_rms_after < report.correction_rms_before; }
 };
 
@@ -39,8 +39,8 @@ struct Polished {
 /// is learned with the input is ours.
 ///
 /// What falls, or strays from the target's shape by more than `most_shape`, is left out; the best round is kept. Where none is
-/// better, or the creature falls from the start, signals and path stay as they were; so they do where of bodies off the plan (kTrials, or of as
-/// many drawn_trials as wanted) more are lost by it than without, or these stray further. `options` as perform's, for the closed loop.
+/// better, or the creature falls from the start, signals and path stay as they were; so they do where of kTrials, or of the
+/// options' own bodies, more are lost by it than without, or stray further. `options` as perform's, for the closed loop.
 Polished polish(const Performer& performer, const SignalSet& signals, const PerformOptions& options, const PolishOptions& polish = {});
 
 }  // namespace hydrostat::retarget

@@ -154,22 +154,33 @@ std::vector<std::string> motion_warnings(const SimulationReport& run) {
 }
 
 std::vector<std::string> polish_warnings(const Polished& polished) {
-  if (!polished.is_frail) return {};
+  if (polished.is_better()) return {};
+  if (!polished.is_frail) return {"polish: left out, for no round of it gave the corrector less to do"};
   const TrialsOutcome &without = polished.solved_on_trials, &with = polished.polished_on_trials;
-  return {sentence("polish: left out, for bodies off the plan lose by it: of %d that are by up to %.0f %%, shoved by %.1f m/s, it loses %d instead of %d, and "
-                   "they go by %.2f %% L from the target instead of %.2f",
-                   with.bodies, 100 * kTrialVariation, kTrialShove, with.lost, without.lost, 100 * with.shape_rms_length,
-                   100 * without.shape_rms_length)};
+  const std::string bodies = sentence("polish: left out, for of %d bodies up to %.0f %% off the plan, shoved by %.1f m/s, ", with.bodies, 100 * kTrialVariation,
+                                      kTrialShove);
+  if (with.lost > without.lost) return {bodies + sentence("it loses %d instead of %d", with.lost, without.lost)};
+  return {bodies + sentence("the mean is %.2f %% L from the target by it instead of %.2f", 100 * with.shape_rms_length, 100 * without.shape_rms_length)};
 }
 
-std::vector<std::string> polished_replay_warnings(const Replay& before, const Replay& after, bool is_as_planned) {
-  if (after.report.fell) return {sentence("polish: left out, for by it the creature falls at %.1f s", after.report.fall_time_s)};
-  if (after.termination == physics::Termination::kDiverged) {
-    return {sentence("polish: left out, for by it the simulation diverges at %.1f s", after.report.duration_s)};
+std::vector<std::string> polished_replay_warnings(const Performances& before, const Performances& after, bool is_as_planned) {
+  const ReplayReport &was = before.main().report, &is = after.main().report;
+  if (is.fell) return {sentence("polish: left out, for by it the creature falls at %.1f s", is.fall_time_s)};
+  if (after.main().termination == physics::Termination::kDiverged) {
+    return {sentence("polish: left out, for by it the simulation diverges at %.1f s", is.duration_s)};
   }
-  if (!is_as_planned || after.report.correction_rms < before.report.correction_rms) return {};
-  return {sentence("polish: left out, for over the whole replay the corrector has more to do by it (%.2g instead of %.2g, RMS)", after.report.correction_rms,
-                   before.report.correction_rms)};
+  if (after.lapse != Lapse::kNothing && before.lapse == Lapse::kNothing) return {"polish: left out, for by it the creature " + in_words(after.lapse, is)};
+  if (after.feedback != before.feedback) return {"polish: left out, for by it the creature needs other feedback"};
+  if (!is_as_planned) return {};
+  if (!(is.correction_rms < was.correction_rms)) {
+    return {sentence("polish: left out, for over the whole replay the corrector has more to do by it (%.3g instead of %.3g, RMS)", is.correction_rms,
+                     was.correction_rms)};
+  }
+  if (!(is.shape_rms_length <= was.shape_rms_length + PolishOptions().most_shape)) {
+    return {sentence("polish: left out, for over the whole replay the shape is %.2f %% L from the target by it instead of %.2f", 100 * is.shape_rms_length,
+                     100 * was.shape_rms_length)};
+  }
+  return {};
 }
 
 }  // namespace hydrostat::retarget

@@ -35,10 +35,10 @@ std::vector<std::string> motion_warnings(const ReplayReport& run);
 /// The same of a scene's simulation, which has no clip.
 std::vector<std::string> motion_warnings(const SimulationReport& run);
 
-/// Of polished signals that were left out, for they cost bodies off the plan their balance.
+/// Of polished signals that were left out, for bodies off the plan are lost or stray by them or nothing was learned.
 std::vector<std::string> polish_warnings(const Polished& polished);
-/// What the whole replay by polished signals says against them beside the one before; none where they are to be kept. How much is corrected
-/// tells something only of what goes as it was planned: nothing pushes it, and the body is no other.
-std::vector<std::string> polished_replay_warnings(const Replay& before, const Replay& after, bool is_as_planned);
+/// What the whole replays by polished signals say against them beside those before; none where they are to be kept. How much is corrected, and
+/// how far the shape is from the target, tells something only of what goes as it was planned: nothing pushes it, and the body is no other.
+std::vector<std::string> polished_replay_warnings(const Performances& before, const Performances& after, bool is_as_planned);
 
 }  // namespace hydrostat::retarget

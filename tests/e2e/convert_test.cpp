@@ -42,6 +42,25 @@ TEST(Convert, HoldsOnToTheClipsShapeAsFirmlyAsIsAsked) {
   EXPECT_EQ(motion_bytes(directory.path / "firm"), motion);
 }
 
+/// On a mesh where the planned body gains by it and one off the plan falls. Nothing else is changed.
+TEST(Convert, LeavesOutPolishThatCostsOtherBodiesTheirBalance) {
+  const TemporaryDirectory directory;
+  const fs::path creature = directory.path / "creature";
+  const std::string options = "--nodes 40 ";
+  convert(directory.path, kSmallClip, "creature", options);
+  const json before = report_of(creature);
+  const std::string motion = motion_bytes(creature), signals = io::read_file(creature / "signals.json");
+  ASSERT_EQ(convert(directory.path, kSmallClip, "creature", options + "--polish on").exit_code, 0);
+  const json after = report_of(creature);
+  EXPECT_FALSE(after.contains("polish"));
+  EXPECT_FALSE(fs::exists(creature / "path.bin"));
+  EXPECT_EQ(io::read_file(creature / "signals.json"), signals);
+  EXPECT_EQ(motion_bytes(creature), motion);
+  EXPECT_EQ(after["replay"]["closed_loop"]["correction_rms"], before["replay"]["closed_loop"]["correction_rms"]);
+  const auto is_told = [](const json& warning) { return warning.get<std::string>().find("polish: left out") != std::string::npos; };
+  EXPECT_TRUE(std::any_of(after["warnings"].begin(), after["warnings"].end(), is_told)) << after["warnings"];
+}
+
 /// What of the correction comes back in every cycle is the signals' own then, and they keep the creature up by themselves for longer.
 TEST(Convert, PolishesTheSignals) {
   const TemporaryDirectory directory;

@@ -291,8 +291,8 @@ TEST(PerformSteadily, TakesTheFirstGainThatStaysUpWhereItIsNotThorough) {
   EXPECT_EQ(steady.trials_lost, 0);
 }
 
-/// What is drawn lies between the corners, on no line between two of them, and is shoved from where none of them is.
-TEST(DrawnTrials, LieBetweenTheCornersAndAreShovedFromSidesOfTheirOwn) {
+/// And where their number goes by four, from where none of the corners is.
+TEST(DrawnTrials, LieWithinTheBoundsAndAreShovedFromSidesOfTheirOwn) {
   const auto sides_apart = [](const Trial& a, const Trial& b) { return std::abs(std::remainder(a.angle - b.angle, 2 * std::numbers::pi)); };
   for (const int count : {2, 4, 8, 12}) {
     SCOPED_TRACE(count);
@@ -329,6 +329,21 @@ TEST(CountTrialsLost, IsNoneOfWhatStandsAndAllOfWhatFalls) {
   EXPECT_EQ(lost, static_cast<int>(kTrials.size()));
   options.threads = 2;
   EXPECT_EQ(go_on_trials(performer, signals, options).lost, lost);
+}
+
+/// As many bodies as are wanted, one by one as in pairs.
+TEST(CountTrialsLost, TakesAnyNumberOfBodies) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = signals_of(performer);
+  const auto shape = [&](std::size_t first, std::size_t count) {
+    const TrialsOutcome outcome = go_on_trials(performer, signals, lasting(0.3), std::span(kTrials).subspan(first, count));
+    EXPECT_EQ(outcome.bodies, static_cast<int>(count));
+    return outcome.shape_rms_length;
+  };
+  const double first = shape(0, 1);
+  EXPECT_GT(first, 0);
+  EXPECT_NEAR(shape(0, 3), (first + 2 * shape(1, 2)) / 3, 1e-15);
+  EXPECT_EQ(shape(0, 0), 0);
 }
 
 /// A single run of a body off the plan may end a little beside its place, but not by over a twentieth of L, as what is shoved on ice.

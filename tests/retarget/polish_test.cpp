@@ -101,13 +101,13 @@ TEST(Polish, IsNotBoughtWithTheBalanceOfOtherBodies) {
   EXPECT_FALSE(kept.is_frail);
   EXPECT_LE(kept.polished_on_trials.lost, kept.solved_on_trials.lost);
   EXPECT_GT(kept.solved_on_trials.shape_rms_length, 0);
-  EXPECT_EQ(kept.polished_on_trials.bodies, PolishOptions().drawn_bodies);
   Performer learned = performer;
   learned.path = kept.path;
-  const TrialsOutcome of_drawn = go_on_trials(learned, kept.signals, options, drawn_trials(PolishOptions().drawn_bodies));
+  const TrialsOutcome of_drawn = go_on_trials(learned, kept.signals, options, PolishOptions().more_trials);
+  EXPECT_EQ(kept.polished_on_trials.bodies, 8);
   EXPECT_EQ(kept.polished_on_trials.shape_rms_length, of_drawn.shape_rms_length);
   PolishOptions strict = quick();  // to whom any straying is too much
-  strict.most_on_trials = -strict.most_shape / kept.solved_on_trials.shape_rms_length;
+  strict.most_on_trials = -HUGE_VAL;
   const Polished left = polish(performer, signals, options, strict);
   EXPECT_TRUE(left.is_frail);
   EXPECT_FALSE(left.is_better());
@@ -115,6 +115,33 @@ TEST(Polish, IsNotBoughtWithTheBalanceOfOtherBodies) {
   EXPECT_EQ(largest_change(left.signals, signals), 0);
   EXPECT_EQ(left.polished_on_trials.bodies, static_cast<int>(kTrials.size())) << "these were enough";
   EXPECT_EQ(left.polished_on_trials.shape_rms_length, go_on_trials(learned, kept.signals, options).shape_rms_length);
+}
+
+/// What the corners have nothing against the other bodies may have.
+TEST(Polish, IsLeftOutWhereOtherBodiesThanTheCornersStrayByIt) {
+  const Performer performer = make_box_performer();
+  const SignalSet signals = wrong_signals(performer);
+  const PerformOptions options = lasting(1.2);
+  PolishOptions far_off = quick();
+  far_off.more_trials = {{{1.3, 1, 0.7}, 0.3}, {{1.3, 1, 0.7}, 2}, {{1.3, 1, 0.7}, 4}};
+  const Polished kept = polish(performer, signals, options, far_off);
+  ASSERT_TRUE(kept.is_better());
+  Performer learned = performer;
+  learned.path = kept.path;
+  const auto least_factor = [&](std::span<const Trial> bodies) {  // that lets it pass
+    const double with = go_on_trials(learned, kept.signals, options, bodies).shape_rms_length;
+    return (with - far_off.most_shape) / go_on_trials(performer, signals, options, bodies).shape_rms_length;
+  };
+  const double of_corners = least_factor(kTrials), of_others = least_factor(far_off.more_trials);
+  ASSERT_GT(of_others, of_corners + 0.1);
+  far_off.most_on_trials = (of_corners + of_others) / 2;
+  const Polished left = polish(performer, signals, options, far_off);
+  EXPECT_TRUE(left.is_frail);
+  EXPECT_EQ(left.polished_on_trials.bodies, 3);
+  EXPECT_TRUE(left.path.is_empty());
+  EXPECT_EQ(largest_change(left.signals, signals), 0);
+  far_off.more_trials.clear();
+  EXPECT_TRUE(polish(performer, signals, options, far_off).is_better());
 }
 
 TEST(Polish, LeavesWhatFallsAsItWas) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "tests/retarget/box_performer.h"
@@ -174,27 +175,55 @@ TEST(MotionWarnings, TellOfWhatCarriedTheCreatureAndOfAStrangeShape) {
   EXPECT_TRUE(motion_warnings(run).empty());
 }
 
-/// Whether it falls, cannot be told or corrects more; but not of how much where that is for a push or another body.
+/// Nothing where it was taken; else what decided.
+TEST(PolishWarnings, TellWhyItWasLeftOut) {
+  Polished polished;
+  polished.report.correction_rms_before = polished.report.correction_rms_after = 0.01;
+  EXPECT_NE(polish_warnings(polished).at(0).find("no round of it"), std::string::npos);
+  polished.is_frail = true;
+  polished.solved_on_trials = {8, 1, 0.004};
+  polished.polished_on_trials = {8, 3, 0.005};
+  EXPECT_NE(polish_warnings(polished).at(0).find("of 8 bodies up to 10 % off the plan, shoved by 0.1 m/s, it loses 3 instead of 1"), std::string::npos);
+  polished.polished_on_trials = {8, 1, 0.0068};
+  EXPECT_NE(polish_warnings(polished).at(0).find("0.68 % L from the target by it instead of 0.40"), std::string::npos);
+  polished.is_frail = false;
+  polished.report.correction_rms_after = 0.001;
+  EXPECT_TRUE(polish_warnings(polished).empty());
+}
+
+/// Whether it falls, loses its way, needs other feedback, cannot be told, corrects more or strays; but the last two not where that is for a
+/// push or another body.
 TEST(PolishedReplayWarnings, AreOfWhatGoesWorseByPolishThanWithout) {
-  Replay before, after;
-  before.report.correction_rms = 4e-4;
-  after.report.correction_rms = 3.9e-4;
-  EXPECT_TRUE(polished_replay_warnings(before, after, true).empty());
+  Performances before;
+  before.closed_loop.emplace();
+  before.closed_loop->report.correction_rms = 4e-4;
+  before.closed_loop->report.shape_rms_length = 0.004;
+  Performances fine = before;
+  fine.closed_loop->report.correction_rms = 3.9e-4;
+  fine.closed_loop->report.shape_rms_length = 0.0049;
+  EXPECT_TRUE(polished_replay_warnings(before, fine, true).empty());
+  const auto told = [&](bool always, const std::function<void(Performances&, ReplayReport&)>& spoil) {
+    Performances after = fine;
+    spoil(after, after.closed_loop->report);
+    EXPECT_EQ(polished_replay_warnings(before, after, false).size(), always ? 1u : 0u);
+    const auto warnings = polished_replay_warnings(before, after, true);
+    return warnings.empty() ? "nothing" : warnings[0];
+  };
+  const auto expect_told = [&](const std::string& what, bool always, const std::function<void(Performances&, ReplayReport&)>& spoil) {
+    EXPECT_NE(told(always, spoil).find(what), std::string::npos) << what;
+  };
   for (const double correction : {4e-4, 8e-4, std::numeric_limits<double>::quiet_NaN()}) {
-    after.report.correction_rms = correction;
-    ASSERT_EQ(polished_replay_warnings(before, after, true).size(), 1u) << correction;
-    EXPECT_TRUE(polished_replay_warnings(before, after, false).empty()) << correction;
+    expect_told("instead of 0.0004", false, [&](Performances&, ReplayReport& run) { run.correction_rms = correction; });
   }
-  after.report.correction_rms = 8e-4;
-  EXPECT_NE(polished_replay_warnings(before, after, true)[0].find("0.0008 instead of 0.0004"), std::string::npos);
-  after.report.correction_rms = 1e-5;
-  after.report.fell = true;
-  after.report.fall_time_s = 3.25;
-  for (const bool is_as_planned : {true, false}) EXPECT_NE(polished_replay_warnings(before, after, is_as_planned).at(0).find("falls at 3.2 s"), std::string::npos);
-  after.report.fell = false;
-  after.termination = physics::Termination::kDiverged;
-  after.report.duration_s = 0.5;
-  for (const bool is_as_planned : {true, false}) EXPECT_NE(polished_replay_warnings(before, after, is_as_planned).at(0).find("diverges at 0.5 s"), std::string::npos);
+  expect_told("0.0008 instead", false, [](Performances&, ReplayReport& run) { run.correction_rms = 8e-4; });
+  expect_told("0.52 % L from the target by it instead of 0.40", false, [](Performances&, ReplayReport& run) { run.shape_rms_length = 0.0052; });
+  expect_told("falls at 3.2 s", true, [](Performances&, ReplayReport& run) { run.fell = true, run.fall_time_s = 3.25; });
+  expect_told("diverges at 0.5 s", true, [](Performances& runs, ReplayReport& run) {
+    runs.closed_loop->termination = physics::Termination::kDiverged;
+    run.duration_s = 0.5;
+  });
+  expect_told("loses its place", true, [](Performances& runs, ReplayReport&) { runs.lapse = Lapse::kLostWay; });
+  expect_told("other feedback", true, [](Performances& runs, ReplayReport&) { runs.feedback.regulator = 1; });
 }
 
 TEST(MotionWarnings, TellOfWhatCarriedTheBodyOfAScene) {

@@ -3,7 +3,7 @@
 #   scenes    pictures of the scenes' accuracy and effects                          minutes
 #   creature  the trot's own curve of accuracy                                      a quarter of an hour
 #   chosen    what convert --max-error 2% chooses for worm, trot and fox  ten minutes
-#   polish    what convert --polish on does (clips that are not ours as above)                  half an hour
+#   polish    what convert --polish on does (clips that are not ours as above)                  an hour
 #   levels    levels of detail, table and picture (clips that are not ours from HYDROSTAT_ASSETS, where they are there)  an hour
 #   speed     what the stages of a conversion cost                                  minutes
 #   import    what reading the samples costs                                        seconds

@@ -331,7 +331,7 @@ void Conversion::polish() {
     signals_text_ = io::signals_text(signals_);
     return;
   }
-  if (performances_.wished_lapse == retarget::Lapse::kNothing && performances_.feedback == before.feedback) {
+  if (performances_.wished_lapse == retarget::Lapse::kNothing) {
     performances_.wished_lapse = before.wished_lapse;
     performances_.trials_lost = before.trials_lost;
   }

@@ -135,9 +135,7 @@ void keep_more_bodies(const Act& act, const PerformOptions& options, Performance
   PerformOptions on_trial = options, other = options;
   on_trial.replay.duration_s = std::min(options.replay.duration_s, kLookSeconds);
   other.baselines = false;
-  Lost least{};
-  find_lost({0, 1}, act, on_trial, least);
-  find_lost({2, 3}, act, on_trial, least);
+  Lost least = lost_on_trials(act, on_trial, {}, static_cast<int>(kTrials.size()) + 1);
   for (const Feedback& feedback : kOthers) {
     if (feedback.regulator == 0 || feedback == options.feedback) continue;  // others are for feet that the usual gain shakes loose
     if (count(least) == 0) break;
